@@ -1,0 +1,1 @@
+//! Speed benchmarks live in `benches/`; this crate has no code of its own.

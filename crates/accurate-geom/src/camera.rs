@@ -1,0 +1,162 @@
+use nalgebra::{Matrix3, Matrix3x4, Vector3};
+
+use crate::error::finite;
+use crate::{GeomError, Point2, Point3};
+
+/// Width and height of an image, px.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ImageSize {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// A pinhole camera `p ~ K (R X + t)`.
+///
+/// Signs on the diagonal of `K` are free: the paper's phantom rigs have f_y < 0, and nothing here
+/// re-derives `K` by a decomposition that would fix them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    k: Matrix3<f64>,
+    r: Matrix3<f64>,
+    t: Vector3<f64>,
+    size: ImageSize,
+    k_inverse: Matrix3<f64>,
+}
+
+impl Camera {
+    /// How far `RᵀR` may be from the identity, entry by entry, and `det R` from 1.
+    ///
+    /// Calibration files print 6 or more significant digits; products of two such entries are
+    /// wrong by less than this.
+    pub const ROTATION_TOLERANCE: f64 = 1e-5;
+
+    /// A camera from intrinsics `k` (px), world-to-camera rotation `r` and translation `t`
+    /// (world unit), and the image size.
+    ///
+    /// # Errors
+    /// [`GeomError::NotFinite`], [`GeomError::NotUpperTriangular`], [`GeomError::ZeroFocalLength`],
+    /// [`GeomError::NotARotation`] (see [`nearest_rotation`]) or [`GeomError::EmptyImage`].
+    pub fn new(
+        k: Matrix3<f64>,
+        r: Matrix3<f64>,
+        t: Vector3<f64>,
+        size: ImageSize,
+    ) -> Result<Self, GeomError> {
+        for (name, m) in [("K", &k), ("R", &r)] {
+            for row in 0..3 {
+                for column in 0..3 {
+                    finite(m[(row, column)], || format!("{name}[{row}][{column}]"))?;
+                }
+            }
+        }
+        for row in 0..3 {
+            finite(t[row], || format!("t[{row}]"))?;
+        }
+        for (row, column, expected) in [(1, 0, 0.0), (2, 0, 0.0), (2, 1, 0.0), (2, 2, 1.0)] {
+            if k[(row, column)] != expected {
+                return Err(GeomError::NotUpperTriangular { row, column, value: k[(row, column)] });
+            }
+        }
+        for index in 0..2 {
+            if k[(index, index)] == 0.0 {
+                return Err(GeomError::ZeroFocalLength { index });
+            }
+        }
+        let orthogonality = (r.transpose() * r - Matrix3::identity()).amax();
+        let determinant = r.determinant();
+        let tolerance = Self::ROTATION_TOLERANCE;
+        if orthogonality > tolerance || (determinant - 1.0).abs() > tolerance {
+            return Err(GeomError::NotARotation { orthogonality, determinant, tolerance });
+        }
+        if size.width == 0 || size.height == 0 {
+            return Err(GeomError::EmptyImage { width: size.width, height: size.height });
+        }
+        let (fx, s, cx) = (k[(0, 0)], k[(0, 1)], k[(0, 2)]);
+        let (fy, cy) = (k[(1, 1)], k[(1, 2)]);
+        #[rustfmt::skip]
+        let k_inverse = Matrix3::new(
+            1.0 / fx, -s / (fx * fy), (s * cy - cx * fy) / (fx * fy),
+            0.0,      1.0 / fy,       -cy / fy,
+            0.0,      0.0,            1.0,
+        );
+        Ok(Self { k, r, t, size, k_inverse })
+    }
+
+    /// Intrinsic matrix, px.
+    pub fn k(&self) -> &Matrix3<f64> {
+        &self.k
+    }
+
+    /// Inverse of the intrinsic matrix.
+    pub fn k_inverse(&self) -> &Matrix3<f64> {
+        &self.k_inverse
+    }
+
+    /// World-to-camera rotation.
+    pub fn r(&self) -> &Matrix3<f64> {
+        &self.r
+    }
+
+    /// World-to-camera translation, world unit.
+    pub fn t(&self) -> &Vector3<f64> {
+        &self.t
+    }
+
+    /// Image size, px.
+    pub fn size(&self) -> ImageSize {
+        self.size
+    }
+
+    /// `P = K [R | t]`, 3 x 4.
+    pub fn projection_matrix(&self) -> Matrix3x4<f64> {
+        let mut rt = Matrix3x4::zeros();
+        rt.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.r);
+        rt.set_column(3, &self.t);
+        self.k * rt
+    }
+
+    /// Camera centre in the world, `-Rᵀ t`.
+    pub fn centre(&self) -> Point3 {
+        Point3::from(-(self.r.transpose() * self.t))
+    }
+
+    /// z of a world point in the camera frame, world unit.
+    pub fn depth(&self, point: &Point3) -> f64 {
+        self.r.row(2).transpose().dot(&point.coords) + self.t.z
+    }
+
+    /// The (undistorted) image of a world point, px.
+    ///
+    /// # Errors
+    /// [`GeomError::NotInFront`] if the depth is not positive (or NaN).
+    pub fn project(&self, point: &Point3) -> Result<Point2, GeomError> {
+        let x_cam = self.r * point.coords + self.t;
+        if !(x_cam.z > 0.0) {
+            return Err(GeomError::NotInFront { depth: x_cam.z });
+        }
+        let p = self.k * (x_cam / x_cam.z);
+        Ok(Point2::new(p.x, p.y))
+    }
+
+    /// Direction of the ray through an (undistorted) image point, in the world frame, pointing away
+    /// from the centre; not normalised: its z in the camera frame is 1.
+    pub fn ray(&self, image_point: &Point2) -> Vector3<f64> {
+        let x_cam = self.k_inverse * Vector3::new(image_point.x, image_point.y, 1.0);
+        self.r.transpose() * x_cam
+    }
+}
+
+/// The rotation nearest to `matrix` in the Frobenius norm (by SVD; Horn 1988), or `None` if the
+/// matrix is singular, not finite, or a reflection.
+///
+/// Not applied silently anywhere: a caller who accepts a rounded calibration file asks for it.
+pub fn nearest_rotation(matrix: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    if !matrix.iter().all(|v| v.is_finite()) || matrix.determinant() <= 0.0 {
+        return None;
+    }
+    let svd = matrix.svd(true, true);
+    let rotation = svd.u? * svd.v_t?;
+    (rotation.determinant() > 0.0).then_some(rotation)
+}

@@ -1,0 +1,151 @@
+use std::marker::PhantomData;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::{Camera, GeomError, Pixel, View, View1, View2};
+
+/// The fundamental matrix that turns a pixel of view `B` into its epipolar line in view `A`:
+/// `p_aᵀ F p_b = 0`. Scaled to Frobenius norm 1.
+///
+/// With `(R, t)` from camera `B` to camera `A` (`x_a = R x_b + t`),
+/// `F = K_a⁻ᵀ [t]ₓ R K_b⁻¹`.
+///
+/// # Source
+/// ACCURATE, section 2.2. The paper leaves the direction of `(R, t)` open; this is the only reading
+/// in which `d(n1, n2)` is a distance of a point of view 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fundamental<A, B> {
+    matrix: Matrix3<f64>,
+    views: PhantomData<(A, B)>,
+}
+
+impl<A: View, B: View> Fundamental<A, B> {
+    /// From the cameras of view `A` and view `B`. A zero baseline has no fundamental matrix; a
+    /// [`Rig`](crate::Rig) has refused it already, hence crate-private.
+    pub(crate) fn from_cameras(camera_a: &Camera, camera_b: &Camera) -> Self {
+        let a_from_b_rotation = camera_a.r() * camera_b.r().transpose();
+        let a_from_b_translation = camera_a.t() - a_from_b_rotation * camera_b.t();
+        let f = camera_a.k_inverse().transpose()
+            * a_from_b_translation.cross_matrix()
+            * a_from_b_rotation
+            * camera_b.k_inverse();
+        Self { matrix: f / f.norm(), views: PhantomData }
+    }
+
+    /// From a 3 x 3 matrix with `p_aᵀ F p_b = 0`, of any scale.
+    ///
+    /// # Errors
+    /// [`GeomError::NotFinite`] if an entry is not finite or all are zero.
+    pub fn from_matrix(matrix: Matrix3<f64>) -> Result<Self, GeomError> {
+        let norm = matrix.norm();
+        if !norm.is_normal() {
+            return Err(GeomError::NotFinite { what: "norm of F".into(), value: norm });
+        }
+        Ok(Self { matrix: matrix / norm, views: PhantomData })
+    }
+
+    /// The 3 x 3 matrix, Frobenius norm 1.
+    pub fn matrix(&self) -> &Matrix3<f64> {
+        &self.matrix
+    }
+
+    /// The matrix of the swapped roles: `p_bᵀ Fᵀ p_a = 0`.
+    pub fn transpose(&self) -> Fundamental<B, A> {
+        Fundamental { matrix: self.matrix.transpose(), views: PhantomData }
+    }
+
+    /// The epipolar line in view `A` of a pixel of view `B`.
+    ///
+    /// # Errors
+    /// [`GeomError::AtEpipole`] if the pixel is the epipole of view `B`.
+    pub fn line(&self, pixel_b: Pixel<B>) -> Result<EpipolarLine<A>, GeomError> {
+        let line = self.matrix * pixel_b.homogeneous();
+        let normal = line.x.hypot(line.y);
+        // NaN fails the comparison too, and is refused with it.
+        if !(normal > 1e-12 * line.norm()) {
+            return Err(GeomError::AtEpipole { view: B::NUMBER, x: pixel_b.x, y: pixel_b.y });
+        }
+        Ok(EpipolarLine { coefficients: line / normal, view: PhantomData })
+    }
+
+    /// The algebraic residual `p_aᵀ F p_b` (no unit; depends on the scale of `F`).
+    pub fn residual(&self, pixel_a: Pixel<A>, pixel_b: Pixel<B>) -> f64 {
+        pixel_a.homogeneous().dot(&(self.matrix * pixel_b.homogeneous()))
+    }
+}
+
+/// A line `a x + b y + c = 0` in view `V` with `a² + b² = 1`, so that its value at a pixel is the
+/// signed distance in px.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EpipolarLine<V> {
+    coefficients: Vector3<f64>,
+    view: PhantomData<V>,
+}
+
+impl<V: View> EpipolarLine<V> {
+    /// `(a, b, c)` with `a² + b² = 1`.
+    pub fn coefficients(&self) -> &Vector3<f64> {
+        &self.coefficients
+    }
+
+    /// Signed distance of a pixel to the line, px.
+    pub fn signed_distance(&self, pixel: Pixel<V>) -> f64 {
+        self.coefficients.x * pixel.x + self.coefficients.y * pixel.y + self.coefficients.z
+    }
+
+    /// Distance of a pixel to the line, px.
+    pub fn distance(&self, pixel: Pixel<V>) -> f64 {
+        self.signed_distance(pixel).abs()
+    }
+}
+
+/// Distance in view 1, px, of `p1` to the epipolar line of `p2`: the paper's `d(n1, n2)`.
+///
+/// # Errors
+/// [`GeomError::AtEpipole`] if `p2` is the epipole.
+///
+/// # Source
+/// ACCURATE, section 2.2.
+pub fn epipolar_distance(
+    f: &Fundamental<View1, View2>,
+    p1: Pixel<View1>,
+    p2: Pixel<View2>,
+) -> Result<f64, GeomError> {
+    Ok(f.line(p2)?.distance(p1))
+}
+
+/// Root mean square of the two point-to-line distances, one in each view, px.
+///
+/// # Errors
+/// [`GeomError::AtEpipole`] if either pixel is an epipole.
+pub fn symmetric_epipolar_distance(
+    f: &Fundamental<View1, View2>,
+    p1: Pixel<View1>,
+    p2: Pixel<View2>,
+) -> Result<f64, GeomError> {
+    let d1 = f.line(p2)?.distance(p1);
+    let d2 = f.transpose().line(p1)?.distance(p2);
+    Ok(d1.hypot(d2) * std::f64::consts::FRAC_1_SQRT_2)
+}
+
+/// Sampson distance, px: to first order the length of the least correction of `(p1, p2)` that makes
+/// the rays meet.
+///
+/// # Errors
+/// [`GeomError::AtEpipole`] if both pixels are epipoles (then no correction is defined).
+///
+/// # Source
+/// Hartley and Zisserman, Multiple View Geometry, 2nd ed., eq. 11.9.
+pub fn sampson_distance(
+    f: &Fundamental<View1, View2>,
+    p1: Pixel<View1>,
+    p2: Pixel<View2>,
+) -> Result<f64, GeomError> {
+    let line1 = f.matrix() * p2.homogeneous();
+    let line2 = f.matrix().transpose() * p1.homogeneous();
+    let gradient = line1.x.hypot(line1.y).hypot(line2.x.hypot(line2.y));
+    if !(gradient > 1e-12 * line1.norm().hypot(line2.norm())) {
+        return Err(GeomError::AtEpipole { view: 2, x: p2.x, y: p2.y });
+    }
+    Ok(p1.homogeneous().dot(&line1).abs() / gradient)
+}
