@@ -1,0 +1,1 @@
+//! One 3D B-spline fitted to both views.
