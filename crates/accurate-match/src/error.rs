@@ -31,6 +31,48 @@ pub enum MatchError {
         /// Candidate pairs that were looked at.
         candidates: usize,
     },
+    /// Pairs were found, but the rays of none of them meet.
+    #[error("{method}: none of the {pairs} matched pairs could be triangulated; the first: {first}")]
+    NothingTriangulated {
+        /// Name of the method.
+        method: &'static str,
+        /// Matched pairs.
+        pairs: usize,
+        /// What the first pair failed with.
+        first: GeomError,
+    },
+    /// A cell of the cost matrix is NaN or minus infinity. (Plus infinity forbids a cell.)
+    #[error("the cost of matching point {i} of view 1 with point {j} of view 2 is {value}")]
+    InvalidCost {
+        /// Index in view 1, from 0.
+        i: usize,
+        /// Index in view 2, from 0.
+        j: usize,
+        /// The value.
+        value: f64,
+    },
+    /// Every path from corner to corner costs more than a number can hold.
+    #[error("no path of finite cost through the {n1} x {n2} costs")]
+    NoFinitePath {
+        /// Points of view 1.
+        n1: usize,
+        /// Points of view 2.
+        n2: usize,
+    },
+    /// The back-pointers would not fit into memory.
+    #[error(
+        "{n1} x {n2} points need {bytes} bytes of back-pointers (limit {limit_bytes}); resample the curves"
+    )]
+    TooLarge {
+        /// Points of view 1.
+        n1: usize,
+        /// Points of view 2.
+        n2: usize,
+        /// Bytes needed, saturating.
+        bytes: u64,
+        /// Bytes allowed, or fewer if the system refused the allocation.
+        limit_bytes: u64,
+    },
     /// Geometry refused a value.
     #[error(transparent)]
     Geometry(#[from] GeomError),

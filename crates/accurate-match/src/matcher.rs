@@ -43,7 +43,11 @@ pub struct CurveReconstruction {
     pub points: Vec<CurvePoint>,
     /// The matched index pairs `(i of view 1, j of view 2)`, monotone where the method promises it.
     /// A method that matches samples of a fitted curve gives the index of the nearest input point.
+    /// As long as `points`: `pairs[k]` belongs to `points[k]`.
     pub pairs: Vec<(usize, usize)>,
+    /// Matched pairs left out because their rays have no usable meeting point (parallel rays, a
+    /// point behind a camera). 0 on sound input.
+    pub dropped: usize,
 }
 
 impl CurveReconstruction {
