@@ -23,6 +23,9 @@ pub struct Camera {
     t: Vector3<f64>,
     size: ImageSize,
     k_inverse: Matrix3<f64>,
+    /// `R⁻¹` rather than `Rᵀ`: they differ when `R` comes from a rounded file, and only the inverse
+    /// makes rays, centre and `F` agree with the projection as given.
+    r_inverse: Matrix3<f64>,
 }
 
 impl Camera {
@@ -81,7 +84,8 @@ impl Camera {
             0.0,      1.0 / fy,       -cy / fy,
             0.0,      0.0,            1.0,
         );
-        Ok(Self { k, r, t, size, k_inverse })
+        let r_inverse = r.try_inverse().unwrap_or_else(|| r.transpose());
+        Ok(Self { k, r, t, size, k_inverse, r_inverse })
     }
 
     /// Intrinsic matrix, px.
@@ -97,6 +101,12 @@ impl Camera {
     /// World-to-camera rotation.
     pub fn r(&self) -> &Matrix3<f64> {
         &self.r
+    }
+
+    /// Camera-to-world rotation: the inverse of [`r`](Self::r), equal to its transpose within
+    /// [`ROTATION_TOLERANCE`](Self::ROTATION_TOLERANCE).
+    pub fn r_inverse(&self) -> &Matrix3<f64> {
+        &self.r_inverse
     }
 
     /// World-to-camera translation, world unit.
@@ -117,9 +127,9 @@ impl Camera {
         self.k * rt
     }
 
-    /// Camera centre in the world, `-Rᵀ t`.
+    /// Camera centre in the world, `-R⁻¹ t`.
     pub fn centre(&self) -> Point3 {
-        Point3::from(-(self.r.transpose() * self.t))
+        Point3::from(-(self.r_inverse * self.t))
     }
 
     /// z of a world point in the camera frame, world unit.
@@ -144,7 +154,7 @@ impl Camera {
     /// from the centre; not normalised: its z in the camera frame is 1.
     pub fn ray(&self, image_point: &Point2) -> Vector3<f64> {
         let x_cam = self.k_inverse * Vector3::new(image_point.x, image_point.y, 1.0);
-        self.r.transpose() * x_cam
+        self.r_inverse * x_cam
     }
 }
 

@@ -23,7 +23,7 @@ impl<A: View, B: View> Fundamental<A, B> {
     /// From the cameras of view `A` and view `B`. A zero baseline has no fundamental matrix; a
     /// [`Rig`](crate::Rig) has refused it already, hence crate-private.
     pub(crate) fn from_cameras(camera_a: &Camera, camera_b: &Camera) -> Self {
-        let a_from_b_rotation = camera_a.r() * camera_b.r().transpose();
+        let a_from_b_rotation = camera_a.r() * camera_b.r_inverse();
         let a_from_b_translation = camera_a.t() - a_from_b_rotation * camera_b.t();
         let f = camera_a.k_inverse().transpose()
             * a_from_b_translation.cross_matrix()

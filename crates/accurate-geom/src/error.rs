@@ -72,6 +72,95 @@ pub enum GeomError {
         /// z in the camera frame, in the rig's unit.
         depth: f64,
     },
+    /// Two rays run side by side: they meet nowhere, or at infinity.
+    #[error(
+        "the rays are parallel: the sine of their angle is {sine:.3e} (at least {least:.0e} needed)"
+    )]
+    ParallelRays {
+        /// Sine of the angle between the rays.
+        sine: f64,
+        /// The least sine accepted.
+        least: f64,
+    },
+    /// The solution lies at infinity.
+    #[error("the point lies at infinity: homogeneous weight {weight:.3e}")]
+    PointAtInfinity {
+        /// Fourth homogeneous coordinate, of a unit 4-vector in baselines.
+        weight: f64,
+    },
+    /// An iteration did not settle.
+    #[error("{what} did not converge in {iterations} iterations")]
+    NoConvergence {
+        /// Which iteration.
+        what: &'static str,
+        /// Steps made.
+        iterations: usize,
+    },
+    /// A curve needs more points than were given.
+    #[error("{found} points are too few: at least {needed} needed")]
+    TooFewPoints {
+        /// Points given.
+        found: usize,
+        /// Points needed.
+        needed: usize,
+    },
+    /// Two consecutive points of a curve coincide.
+    #[error("point {index} repeats the point before it")]
+    DuplicatePoint {
+        /// Index of the second of the two.
+        index: usize,
+    },
+    /// The numbers of two lists that belong together differ.
+    #[error("{what}: expected {expected}, found {found}")]
+    LengthMismatch {
+        /// What was counted.
+        what: &'static str,
+        /// The number it must have.
+        expected: usize,
+        /// The number it has.
+        found: usize,
+    },
+    /// A knot vector is not a clamped cubic one: non-decreasing, four equal knots at each end, at
+    /// most three equal ones between.
+    #[error(
+        "knot {index} = {value} breaks the order or the multiplicity of a clamped cubic spline"
+    )]
+    BadKnot {
+        /// Index of the knot.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// A number lies outside its range.
+    #[error("{what} = {value}: expected {expected}")]
+    OutOfRange {
+        /// The offending quantity.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// The range in words.
+        expected: &'static str,
+    },
+    /// The data do not determine every control point.
+    #[error("control point {index} is not determined by the data: fewer control points are needed")]
+    Underdetermined {
+        /// First control point without enough data.
+        index: usize,
+    },
+    /// A 3 x 4 matrix is no camera: its left 3 x 3 block is singular.
+    #[error("the projection matrix has a singular left block: row {row} depends on the others")]
+    SingularProjection {
+        /// Row, from 0, found dependent (rows are taken from the last to the first).
+        row: usize,
+    },
+    /// The lens model is not one to one at this point.
+    #[error("the distortion model cannot be inverted at pixel ({x}, {y})")]
+    DistortionFolds {
+        /// Column, px.
+        x: f64,
+        /// Row, px.
+        y: f64,
+    },
 }
 
 /// Refuses NaN and infinities, naming the quantity.

@@ -15,6 +15,7 @@ mod epipolar;
 mod error;
 mod pixel;
 mod rig;
+mod triangulate;
 mod unit;
 
 pub use camera::{Camera, ImageSize, nearest_rotation};
@@ -25,6 +26,7 @@ pub use error::GeomError;
 pub use nalgebra;
 pub use pixel::{Pixel, View, View1, View2};
 pub use rig::Rig;
+pub use triangulate::{Triangulation, Triangulator, UnknownTriangulation};
 pub use unit::{LengthUnit, UnknownUnit};
 
 /// A point of an image plane, in px.
