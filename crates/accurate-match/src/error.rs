@@ -32,7 +32,9 @@ pub enum MatchError {
         candidates: usize,
     },
     /// Pairs were found, but the rays of none of them meet.
-    #[error("{method}: none of the {pairs} matched pairs could be triangulated; the first: {first}")]
+    #[error(
+        "{method}: none of the {pairs} matched pairs could be triangulated; the first: {first}"
+    )]
     NothingTriangulated {
         /// Name of the method.
         method: &'static str,
@@ -59,9 +61,9 @@ pub enum MatchError {
         /// Points of view 2.
         n2: usize,
     },
-    /// The back-pointers would not fit into memory.
+    /// The alignment would need more memory than is allowed.
     #[error(
-        "{n1} x {n2} points need {bytes} bytes of back-pointers (limit {limit_bytes}); resample the curves"
+        "aligning {n1} with {n2} points needs {bytes} bytes (limit {limit_bytes}); resample the curves"
     )]
     TooLarge {
         /// Points of view 1.
@@ -70,8 +72,18 @@ pub enum MatchError {
         n2: usize,
         /// Bytes needed, saturating.
         bytes: u64,
-        /// Bytes allowed, or fewer if the system refused the allocation.
+        /// Bytes allowed.
         limit_bytes: u64,
+    },
+    /// The system refused the memory of an alignment.
+    #[error("no memory for aligning {n1} with {n2} points ({bytes} bytes); resample the curves")]
+    OutOfMemory {
+        /// Points of view 1.
+        n1: usize,
+        /// Points of view 2.
+        n2: usize,
+        /// Bytes needed.
+        bytes: u64,
     },
     /// Geometry refused a value.
     #[error(transparent)]

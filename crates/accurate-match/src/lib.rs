@@ -1,7 +1,32 @@
-//! Two ordered curves to correspondences to 3D points.
+//! Two ordered curves to correspondences to 3D points, by monotone dynamic programming over
+//! epipolar distances (ECDP).
+//!
+//! [`Ecdp`] is the whole method. Its stages can be used alone: [`CostModel`] gives epipolar
+//! distances in O(1) per pair of points, [`align`] and [`align_rows`] find the cheapest monotone
+//! path through any costs, [`refine`] makes one-to-many matches unique, [`triangulate_pairs`] turns
+//! pairs of pixels into a 3D curve. Every method that does this job is a [`CurveMatcher`].
+//!
+//! Conventions are those of [`accurate_geom`]: pixels with x to the right and y down, `f64`
+//! throughout, undistorted coordinates.
+//!
+//! # Source
+//! ACCURATE, section 2.3.
 
+mod cost;
+mod dp;
+mod ecdp;
 mod error;
 mod matcher;
+mod pairs;
+mod ray_image;
+mod refine;
 
+pub use cost::{CostModel, DistanceKind, validate_curve};
+pub use dp::{Alignment, MAX_ALIGNMENT_BYTES, TieOrder, align, align_rows};
+pub use ecdp::{Ecdp, EcdpParams};
 pub use error::MatchError;
 pub use matcher::{CurveMatcher, CurvePoint, CurveReconstruction};
+pub use pairs::{PixelPair, triangulate_pairs};
+pub use refine::{
+    ON_LINE_PX, RefineDirections, RefineRule, horizontal_runs, longest_run, refine, vertical_runs,
+};
