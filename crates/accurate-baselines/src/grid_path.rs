@@ -1,7 +1,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use crate::BaselineError;
+use accurate_match::MatchError;
 
 /// The cheapest monotone path through a grid of cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,8 +21,8 @@ pub struct GridPath {
 /// and only a strictly cheaper way replaces an earlier one.
 ///
 /// # Errors
-/// [`BaselineError::EmptyGrid`] without cells; [`BaselineError::Cost`] at the first visited cell
-/// whose cost is negative or NaN; [`BaselineError::NoPath`] if every path meets an infinite cell or
+/// [`MatchError::Empty`] without cells; [`MatchError::InvalidCost`] at the first visited cell
+/// whose cost is negative or NaN; [`MatchError::NoFinitePath`] if every path meets an infinite cell or
 /// its sum overflows.
 ///
 /// # Cost
@@ -35,13 +35,15 @@ pub fn cheapest_grid_path(
     n1: usize,
     n2: usize,
     cost: impl Fn(usize, usize) -> f64,
-) -> Result<GridPath, BaselineError> {
-    if n1 == 0 || n2 == 0 {
-        return Err(BaselineError::EmptyGrid { n1, n2 });
+) -> Result<GridPath, MatchError> {
+    for (view, n) in [(1, n1), (2, n2)] {
+        if n == 0 {
+            return Err(MatchError::Empty { view });
+        }
     }
     let checked = |i, j| {
         let value: f64 = cost(i, j);
-        if value >= 0.0 { Ok(value) } else { Err(BaselineError::Cost { i, j, value }) }
+        if value >= 0.0 { Ok(value) } else { Err(MatchError::InvalidCost { i, j, value }) }
     };
     let goal = (n1 - 1, n2 - 1);
     let mut reached = vec![f64::INFINITY; n1 * n2];
@@ -77,7 +79,7 @@ pub fn cheapest_grid_path(
     }
     let total = reached[n1 * n2 - 1];
     if !total.is_finite() {
-        return Err(BaselineError::NoPath { n1, n2 });
+        return Err(MatchError::NoFinitePath { n1, n2 });
     }
     let mut cells = vec![goal];
     let (mut i, mut j) = goal;
@@ -207,18 +209,15 @@ mod tests {
 
     #[test]
     fn costs_that_are_negative_or_not_a_number_are_refused() {
-        assert!(matches!(
-            cheapest_grid_path(0, 3, |_, _| 1.0),
-            Err(BaselineError::EmptyGrid { .. })
-        ));
+        assert!(matches!(cheapest_grid_path(0, 3, |_, _| 1.0), Err(MatchError::Empty { view: 1 })));
         for bad in [-1.0, f64::NAN] {
             assert!(matches!(
                 cheapest_grid_path(2, 2, |_, _| bad),
-                Err(BaselineError::Cost { i: 0, j: 0, .. })
+                Err(MatchError::InvalidCost { i: 0, j: 0, .. })
             ));
         }
         for huge in [f64::MAX, f64::INFINITY] {
-            let none = Err(BaselineError::NoPath { n1: 9, n2: 9 });
+            let none = Err(MatchError::NoFinitePath { n1: 9, n2: 9 });
             assert_eq!(cheapest_grid_path(9, 9, |_, _| huge), none);
         }
     }

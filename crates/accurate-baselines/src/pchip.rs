@@ -1,4 +1,4 @@
-use crate::BaselineError;
+use accurate_geom::GeomError;
 
 /// A monotone piecewise cubic through given knots: between two knots it never leaves their values,
 /// so that it rises where the data rise and is constant where they are.
@@ -22,27 +22,32 @@ impl Pchip {
     /// constant.
     ///
     /// # Errors
-    /// [`BaselineError::Knots`] if there is no knot, one is not finite, `x` does not increase, or
-    /// two knots are so close that their slope overflows.
-    pub fn new(knots: &[(f64, f64)]) -> Result<Self, BaselineError> {
+    /// [`GeomError::TooFewPoints`] without a knot, [`GeomError::NotFinite`] for a knot,
+    /// [`GeomError::OutOfRange`] if `x` does not increase or two knots are so close that their slope
+    /// overflows.
+    pub fn new(knots: &[(f64, f64)]) -> Result<Self, GeomError> {
         let count = knots.len();
-        let bad = |index| BaselineError::Knots { index, count };
         if count == 0 {
-            return Err(bad(0));
+            return Err(GeomError::TooFewPoints { found: 0, needed: 1 });
         }
         for (index, knot) in knots.iter().enumerate() {
-            if !knot.0.is_finite() || !knot.1.is_finite() {
-                return Err(bad(index));
+            for (name, value) in [("x", knot.0), ("y", knot.1)] {
+                if !value.is_finite() {
+                    let what = format!("{name} of PCHIP knot {index}");
+                    return Err(GeomError::NotFinite { what, value });
+                }
             }
         }
         let mut step = Vec::with_capacity(count - 1);
         let mut secant = Vec::with_capacity(count - 1);
-        for (index, pair) in knots.windows(2).enumerate() {
+        for pair in knots.windows(2) {
             let h = pair[1].0 - pair[0].0;
             let delta = (pair[1].1 - pair[0].1) / h;
             // A slope of three secants must not overflow either.
             if !(h > 0.0 && h.is_finite() && delta.abs() < f64::MAX / 8.0) {
-                return Err(bad(index + 1));
+                let what = "step between PCHIP knots";
+                let expected = "a finite number above 0, with a finite slope";
+                return Err(GeomError::OutOfRange { what, value: h, expected });
             }
             step.push(h);
             secant.push(delta);
@@ -172,7 +177,7 @@ mod tests {
 
     #[test]
     fn knots_that_do_not_increase_are_refused() {
-        assert_eq!(Pchip::new(&[]), Err(BaselineError::Knots { index: 0, count: 0 }));
+        assert_eq!(Pchip::new(&[]), Err(GeomError::TooFewPoints { found: 0, needed: 1 }));
         assert!(Pchip::new(&[(0.0, 0.0), (0.0, 1.0)]).is_err());
         assert!(Pchip::new(&[(0.0, f64::NAN)]).is_err());
         assert!(Pchip::new(&[(0.0, -1e308), (1e-5, 1e308)]).is_err());

@@ -1,0 +1,18 @@
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
+mod support;
+use accurate_baselines::HoffmannTable;
+use accurate_match::CurveMatcher;
+use support::*;
+
+#[test]
+fn rounded_pixels_of_a_helix_come_back_within_their_rounding() {
+    let rig = turntable_rig(40.0);
+    let truth = sampled(3000, helix);
+    let (a, b) = rounded_images(&rig, &truth);
+    let found = HoffmannTable::PAPER.reconstruct(&a, &b, &rig).unwrap();
+    let worst =
+        found.points.iter().map(|p| distance_to_curve(&p.position, &truth)).fold(0.0, f64::max);
+    println!("{} points, worst {worst}", found.points.len());
+    assert!(found.pairs.windows(2).all(|w| w[0].0 < w[1].0 && w[0].1 < w[1].1));
+    assert!(found.points.len() > a.len() / 2);
+}
