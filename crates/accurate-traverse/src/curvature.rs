@@ -40,10 +40,11 @@ impl CurvatureRows {
             candidate_row: rows.last().copied().unwrap_or_default(),
         };
         for (point, row) in before.iter().zip(rows) {
-            for axis in 0..2 {
-                sums.first[axis] += row[0] * point[axis];
-                sums.second[axis] += row[1] * point[axis];
-            }
+            let ([x, y], [first, second]) = (point, row);
+            sums.first[0] += first * x;
+            sums.first[1] += first * y;
+            sums.second[0] += second * x;
+            sums.second[1] += second * y;
         }
         Some(sums)
     }
