@@ -172,7 +172,9 @@ impl CostModel {
             }
         }
         for &j in &self.lineless2 {
-            row[j] = self.cost(i, j);
+            if let Some(cell) = row.get_mut(j) {
+                *cell = self.cost(i, j);
+            }
         }
     }
 

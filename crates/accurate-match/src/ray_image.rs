@@ -7,7 +7,7 @@ const EPIPOLE_RADIUS: f64 = 1e-9;
 
 /// What the viewing ray of a pixel of one view looks like in view `A`.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum RayImage<A> {
+pub(crate) enum RayImage<A: View> {
     /// A line, as a rule.
     Line(EpipolarLine<A>),
     /// The ray is the baseline itself: its pixel is the epipole, and every epipolar plane contains
