@@ -1,0 +1,142 @@
+use ndarray::ArrayView2;
+
+/// For every pixel of a window around a mask: the nearest foreground pixel.
+///
+/// The window is the mask's bounding box and a margin, cut at the image border; a position outside
+/// it is first moved to the nearest pixel of the window.
+///
+/// # Source
+/// Felzenszwalb and Huttenlocher, Distance Transforms of Sampled Functions, 2012 (exact).
+#[derive(Debug, Clone)]
+pub(crate) struct DistanceMap {
+    /// Column and row of the window's first pixel.
+    x0: usize,
+    y0: usize,
+    width: usize,
+    height: usize,
+    /// Column and row of the nearest foreground pixel, row by row of the window.
+    nearest: Vec<[u32; 2]>,
+}
+
+impl DistanceMap {
+    /// `mask` must have a foreground pixel; `bounds` is its bounding box `[x_min, y_min, x_max, y_max]`.
+    ///
+    /// Cost: O(window) time and memory.
+    pub(crate) fn new(mask: &ArrayView2<'_, bool>, bounds: [usize; 4], margin: usize) -> Self {
+        let (rows, columns) = mask.dim();
+        let (x0, y0) = (bounds[0].saturating_sub(margin), bounds[1].saturating_sub(margin));
+        let width = (bounds[2] + margin).min(columns - 1) - x0 + 1;
+        let height = (bounds[3] + margin).min(rows - 1) - y0 + 1;
+
+        // Nearest foreground row within each column; none = u32::MAX.
+        const NONE: u32 = u32::MAX;
+        let mut row_of = vec![NONE; width * height];
+        for y in 0..height {
+            for x in 0..width {
+                let i = y * width + x;
+                if mask[[y0 + y, x0 + x]] {
+                    row_of[i] = y as u32;
+                } else if y > 0 {
+                    row_of[i] = row_of[i - width];
+                }
+            }
+        }
+        for y in (0..height.saturating_sub(1)).rev() {
+            for x in 0..width {
+                let i = y * width + x;
+                let below = row_of[i + width];
+                if below != NONE {
+                    let here = row_of[i];
+                    if here == NONE || below.abs_diff(y as u32) < here.abs_diff(y as u32) {
+                        row_of[i] = below;
+                    }
+                }
+            }
+        }
+
+        // Along each row: the lower envelope of the parabolas (x - q)² + g(q)².
+        let mut nearest = vec![[0u32; 2]; width * height];
+        let mut centre: Vec<usize> = Vec::with_capacity(width);
+        let mut from: Vec<f64> = Vec::with_capacity(width);
+        for y in 0..height {
+            centre.clear();
+            from.clear();
+            let row = &row_of[y * width..(y + 1) * width];
+            let height_at = |q: usize| {
+                let dy = f64::from(row[q]) - y as f64;
+                dy * dy + (q * q) as f64
+            };
+            for q in 0..width {
+                if row[q] == NONE {
+                    continue;
+                }
+                loop {
+                    let Some(&last) = centre.last() else {
+                        from.push(f64::NEG_INFINITY);
+                        break;
+                    };
+                    let meet = (height_at(q) - height_at(last)) / (2.0 * (q - last) as f64);
+                    if meet > from[from.len() - 1] {
+                        from.push(meet);
+                        break;
+                    }
+                    centre.pop();
+                    from.pop();
+                }
+                centre.push(q);
+            }
+            let mut k = 0;
+            for x in 0..width {
+                while k + 1 < centre.len() && from[k + 1] <= x as f64 {
+                    k += 1;
+                }
+                let q = centre[k];
+                nearest[y * width + x] = [(x0 + q) as u32, y0 as u32 + row[q]];
+            }
+        }
+        Self { x0, y0, width, height, nearest }
+    }
+
+    /// The foreground pixel nearest to the pixel of the window nearest to `(x, y)`.
+    pub(crate) fn nearest(&self, x: f64, y: f64) -> [f64; 2] {
+        // `as usize` saturates, so that far or non-finite positions stay in the window.
+        let column = (x.round() as usize).clamp(self.x0, self.x0 + self.width - 1) - self.x0;
+        let row = (y.round() as usize).clamp(self.y0, self.y0 + self.height - 1) - self.y0;
+        let [qx, qy] = self.nearest[row * self.width + column];
+        [f64::from(qx), f64::from(qy)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_nearest_pixel_is_as_near_as_a_search_of_all_finds(
+            (rows, columns) in (1usize..14, 1usize..14),
+            bits in prop::collection::vec(prop::bool::weighted(0.2), 196),
+            first in 0usize..196,
+        ) {
+            let mut mask = Array2::from_shape_fn((rows, columns), |(r, c)| bits[r * 14 + c]);
+            mask[[first % rows, first % columns]] = true;
+            let foreground: Vec<(usize, usize)> = mask.indexed_iter()
+                .filter(|(_, set)| **set).map(|(at, _)| at).collect();
+            let bounds = [0, 0, columns - 1, rows - 1];
+            let map = DistanceMap::new(&mask.view(), bounds, 3);
+            for y in 0..rows {
+                for x in 0..columns {
+                    let [qx, qy] = map.nearest(x as f64, y as f64);
+                    prop_assert!(mask[[qy as usize, qx as usize]]);
+                    let found = (qx - x as f64).powi(2) + (qy - y as f64).powi(2);
+                    let best = foreground.iter()
+                        .map(|&(r, c)| (c as f64 - x as f64).powi(2) + (r as f64 - y as f64).powi(2))
+                        .fold(f64::INFINITY, f64::min);
+                    prop_assert_eq!(found, best);
+                }
+            }
+        }
+    }
+}

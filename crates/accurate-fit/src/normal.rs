@@ -1,0 +1,294 @@
+use accurate_geom::nalgebra::Vector3;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
+use faer::{Conj, MatMut, Par, Side};
+
+use crate::FitError;
+
+/// Normal equations of a uniform cubic spline (three unknowns per control point) and a few global
+/// unknowns behind them: `(H + damping) step = -gradient`.
+///
+/// The upper triangle is kept in compressed columns. The spline's part is a band (a residual sees
+/// four control points), the global columns are full and come last, where they cause no fill-in.
+/// Symbolic factorisation once per size, by faer.
+pub(crate) struct NormalEquations {
+    controls: usize,
+    globals: usize,
+    pattern: SymbolicSparseColMat<usize>,
+    /// Index of the entry `(row 0, column)` were it stored: entry `(row, column)` is at
+    /// `base[column] + row` (wrapping).
+    base: Vec<usize>,
+    values: Vec<f64>,
+    gradient: Vec<f64>,
+    /// Scratch of the solver.
+    damped: Vec<f64>,
+    step: Vec<f64>,
+    factor: Vec<f64>,
+    symbolic: SymbolicCholesky<usize>,
+    memory: MemBuffer,
+}
+
+impl NormalEquations {
+    /// Zero equations for `controls >= 4` control points and `globals` global unknowns.
+    pub(crate) fn new(controls: usize, globals: usize) -> Result<Self, FitError> {
+        let n = 3 * controls + globals;
+        let mut column_start = Vec::with_capacity(n + 1);
+        let mut rows = Vec::new();
+        let mut base = Vec::with_capacity(n);
+        column_start.push(0);
+        for column in 0..n {
+            let first = if column < 3 * controls { 3 * (column / 3).saturating_sub(3) } else { 0 };
+            base.push(rows.len().wrapping_sub(first));
+            rows.extend(first..=column);
+            column_start.push(rows.len());
+        }
+        let nnz = rows.len();
+        let pattern = SymbolicSparseColMat::new_checked(n, n, column_start, None, rows);
+        let singular = || FitError::Singular { unknowns: n };
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SIMPLICIAL,
+            ..Default::default()
+        };
+        let symbolic = factorize_symbolic_cholesky(
+            pattern.as_ref(),
+            Side::Upper,
+            SymmetricOrdering::Identity,
+            params,
+        )
+        .map_err(|_| singular())?;
+        let scratch = symbolic
+            .factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default())
+            .or(symbolic.solve_in_place_scratch::<f64>(n, Par::Seq));
+        let memory = MemBuffer::try_new(scratch).map_err(|_| singular())?;
+        let factor = vec![0.0; symbolic.len_val()];
+        Ok(Self {
+            controls,
+            globals,
+            pattern,
+            base,
+            values: vec![0.0; nnz],
+            gradient: vec![0.0; n],
+            damped: vec![0.0; nnz],
+            step: vec![0.0; n],
+            factor,
+            symbolic,
+            memory,
+        })
+    }
+
+    /// Number of unknowns.
+    pub(crate) fn unknowns(&self) -> usize {
+        self.gradient.len()
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.values.fill(0.0);
+        self.gradient.fill(0.0);
+    }
+
+    #[inline]
+    fn at(&mut self, row: usize, column: usize) -> &mut f64 {
+        &mut self.values[self.base[column].wrapping_add(row)]
+    }
+
+    /// Adds `weight / 2 * residual²` whose gradient with respect to control point `span + k` is
+    /// `basis[k] * gradient`.
+    #[inline]
+    pub(crate) fn add(
+        &mut self,
+        span: usize,
+        basis: &[f64; 4],
+        gradient: &[f64; 3],
+        residual: f64,
+        weight: f64,
+    ) {
+        let mut row = [0.0; 12];
+        for k in 0..4 {
+            for axis in 0..3 {
+                row[3 * k + axis] = basis[k] * gradient[axis];
+            }
+        }
+        let first = 3 * span;
+        for (c, &value) in row.iter().enumerate() {
+            let scaled = weight * value;
+            self.gradient[first + c] += scaled * residual;
+            let start = self.base[first + c].wrapping_add(first);
+            let column = &mut self.values[start..=start + c];
+            for (entry, &other) in column.iter_mut().zip(&row) {
+                *entry += scaled * other;
+            }
+        }
+    }
+
+    /// As [`NormalEquations::add`], for a residual that also depends on the global unknowns, with
+    /// the derivatives `global`.
+    pub(crate) fn add_with_globals(
+        &mut self,
+        span: usize,
+        basis: &[f64; 4],
+        gradient: &[f64; 3],
+        global: &[f64],
+        residual: f64,
+        weight: f64,
+    ) {
+        self.add(span, basis, gradient, residual, weight);
+        let first_global = 3 * self.controls;
+        for (b, &value) in global.iter().enumerate() {
+            if value == 0.0 {
+                continue;
+            }
+            let scaled = weight * value;
+            let column = first_global + b;
+            self.gradient[column] += scaled * residual;
+            for k in 0..4 {
+                for axis in 0..3 {
+                    *self.at(3 * (span + k) + axis, column) += scaled * basis[k] * gradient[axis];
+                }
+            }
+            for (a, &other) in global[..=b].iter().enumerate() {
+                *self.at(first_global + a, column) += scaled * other;
+            }
+        }
+    }
+
+    /// Adds `weight / 2 * residual²` of a global unknown alone.
+    pub(crate) fn add_prior(&mut self, global: usize, residual: f64, weight: f64) {
+        let column = 3 * self.controls + global;
+        self.gradient[column] += weight * residual;
+        *self.at(column, column) += weight;
+    }
+
+    /// Adds half of `lambda2 |D2 c|² + lambda3 |D3 c|²`, second and third differences of the control
+    /// points.
+    pub(crate) fn add_smoothness(&mut self, control: &[Vector3<f64>], lambda2: f64, lambda3: f64) {
+        self.add_difference(control, &[1.0, -2.0, 1.0], lambda2);
+        self.add_difference(control, &[-1.0, 3.0, -3.0, 1.0], lambda3);
+    }
+
+    fn add_difference(&mut self, control: &[Vector3<f64>], stencil: &[f64], lambda: f64) {
+        if lambda == 0.0 {
+            return;
+        }
+        for (first, window) in control.windows(stencil.len()).enumerate() {
+            let mut difference = Vector3::zeros();
+            for (c, s) in window.iter().zip(stencil) {
+                difference += c * *s;
+            }
+            for (j, sj) in stencil.iter().enumerate() {
+                for axis in 0..3 {
+                    let column = 3 * (first + j) + axis;
+                    self.gradient[column] += lambda * sj * difference[axis];
+                    for (i, si) in stencil[..=j].iter().enumerate() {
+                        *self.at(3 * (first + i) + axis, column) += lambda * si * sj;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Factorises `H + damping * diag(H)`.
+    pub(crate) fn factorise(&mut self, damping: f64) -> Result<Factor<'_>, FitError> {
+        let unknowns = self.unknowns();
+        let singular = FitError::Singular { unknowns };
+        self.damped.copy_from_slice(&self.values);
+        let mut largest = 0.0f64;
+        for column in 0..unknowns {
+            largest = largest.max(self.values[self.base[column].wrapping_add(column)]);
+        }
+        if !(largest > 0.0 && largest.is_finite()) {
+            return Err(singular);
+        }
+        for column in 0..unknowns {
+            let diagonal = &mut self.damped[self.base[column].wrapping_add(column)];
+            // An unknown that no residual sees must still have a pivot.
+            *diagonal += damping * diagonal.max(1e-9 * largest);
+        }
+        let matrix = SparseColMatRef::new(self.pattern.as_ref(), self.damped.as_slice());
+        let stack = MemStack::new(&mut self.memory);
+        self.symbolic
+            .factorize_numeric_llt(
+                &mut self.factor,
+                matrix,
+                Side::Upper,
+                LltRegularization::default(),
+                Par::Seq,
+                stack,
+                Default::default(),
+            )
+            .map_err(|_| singular)?;
+        Ok(Factor {
+            symbolic: &self.symbolic,
+            factor: &self.factor,
+            memory: &mut self.memory,
+            gradient: &self.gradient,
+            step: &mut self.step,
+        })
+    }
+
+    /// The damped step, one number per unknown.
+    pub(crate) fn solve(&mut self, damping: f64) -> Result<&[f64], FitError> {
+        let unknowns = self.unknowns();
+        let step = self.factorise(damping)?.into_step();
+        if step.iter().all(|v| v.is_finite()) {
+            Ok(step)
+        } else {
+            Err(FitError::Singular { unknowns })
+        }
+    }
+
+    /// Number of global unknowns.
+    pub(crate) fn globals(&self) -> usize {
+        self.globals
+    }
+
+    /// Gradient of the cost, one number per unknown.
+    #[cfg(test)]
+    pub(crate) fn gradient(&self) -> &[f64] {
+        &self.gradient
+    }
+}
+
+impl std::fmt::Debug for NormalEquations {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "NormalEquations({} controls, {} globals)", self.controls, self.globals)
+    }
+}
+
+/// A Cholesky factor of damped [`NormalEquations`].
+pub(crate) struct Factor<'a> {
+    symbolic: &'a SymbolicCholesky<usize>,
+    factor: &'a [f64],
+    memory: &'a mut MemBuffer,
+    gradient: &'a [f64],
+    step: &'a mut [f64],
+}
+
+impl<'a> Factor<'a> {
+    /// Solves for `columns` right-hand sides, stored one after the other, in place.
+    pub(crate) fn solve_in_place(&mut self, rhs: &mut [f64], columns: usize) {
+        let n = self.gradient.len();
+        let rhs = MatMut::from_column_major_slice_mut(rhs, n, columns);
+        let stack = MemStack::new(self.memory);
+        LltRef::<'_, usize, f64>::new(self.symbolic, self.factor).solve_in_place_with_conj(
+            Conj::No,
+            rhs,
+            Par::Seq,
+            stack,
+        );
+    }
+
+    fn into_step(mut self) -> &'a [f64] {
+        let step = std::mem::take(&mut self.step);
+        for (s, g) in step.iter_mut().zip(self.gradient) {
+            *s = -g;
+        }
+        self.solve_in_place(step, 1);
+        step
+    }
+}

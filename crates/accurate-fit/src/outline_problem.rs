@@ -1,0 +1,309 @@
+use accurate_geom::nalgebra::{RowVector3, Vector2};
+
+use crate::FitError;
+use crate::chords::{Chords, Nearest, is_sampled};
+use crate::normal::NormalEquations;
+use crate::outline::OutlineData;
+use crate::projector::{Nuisance, Projector};
+use crate::uniform_spline::{UniformSpline, basis, basis_1};
+
+/// What the boundary fit solves for.
+#[derive(Debug, Clone)]
+pub(crate) struct State {
+    pub(crate) spline: UniformSpline,
+    /// Half thickness of the body in each view, px.
+    pub(crate) half_px: [f64; 2],
+    pub(crate) nuisance: Nuisance,
+}
+
+/// The settings of one iteration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Settings {
+    /// Outline points farther than this from the body's own outline are no data, px.
+    pub(crate) reach_px: f64,
+    /// Scale of the Cauchy weights, px.
+    pub(crate) scale_px: f64,
+    /// One outline point in so many is used.
+    pub(crate) stride: usize,
+    /// Smoothness, already in world units.
+    pub(crate) lambda2: f64,
+    pub(crate) lambda3: f64,
+    /// Weight of a curve sample outside the mask, per px of length.
+    pub(crate) outside_weight: f64,
+}
+
+/// One residual `|q - x(u)| - offset` of a projected curve point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    pub(crate) view: usize,
+    pub(crate) span: usize,
+    pub(crate) basis: [f64; 4],
+    /// Derivative with respect to the curve point, per world unit.
+    pub(crate) gradient: [f64; 3],
+    /// Derivatives with respect to the shift and the roll of view 2.
+    pub(crate) nuisance: [f64; 3],
+    pub(crate) distance: f64,
+    /// Curve samples outside the mask have a fixed weight and no half thickness.
+    pub(crate) outside: bool,
+    /// Index of the outline point.
+    pub(crate) point: usize,
+}
+
+/// A state with its residuals.
+#[derive(Debug, Clone)]
+pub(crate) struct Evaluation {
+    pub(crate) state: State,
+    pub(crate) rows: Vec<Row>,
+    /// Outline points looked at that gave no row, by view.
+    pub(crate) left_out: [usize; 2],
+    pub(crate) nearest: [Vec<Nearest>; 2],
+    pub(crate) chords: [Chords; 2],
+}
+
+/// Two outlines, two cameras.
+#[derive(Debug, Clone)]
+pub(crate) struct OutlineProblem<'a> {
+    pub(crate) outlines: [&'a OutlineData; 2],
+    /// Straight stretches, `[x0, y0, x1, y1]`, on which the curve may leave the mask.
+    pub(crate) bridges: [&'a [[f64; 4]]; 2],
+    pub(crate) projectors: [Projector; 2],
+    /// Chords per span: about 1.5 px each.
+    pub(crate) steps: usize,
+    pub(crate) px_per_unit: f64,
+}
+
+/// Distances beyond which a curve sample outside the mask is left alone, and within which it is
+/// taken to be inside, px.
+const OUTSIDE_PX: [f64; 2] = [1.2, 25.0];
+/// Half width of a bridge, px.
+const BRIDGE_HALF_PX: f64 = 4.0;
+/// An outline point is no datum if its outward normal turns more than this (cosine) away from the
+/// curve: the cut face of a gap, or the other side of the body.
+const MIN_COSINE: f64 = 0.2;
+/// ... or if it lies deeper in the body than this fraction of the half thickness.
+const MIN_DEPTH: f64 = 0.3;
+/// Residuals are looked for at least so far for [`Judgement`](crate::Judgement), px.
+pub(crate) const JUDGED_PX: f64 = 4.8;
+
+impl OutlineProblem<'_> {
+    pub(crate) fn evaluation(&self, state: State) -> Evaluation {
+        Evaluation {
+            state,
+            rows: Vec::new(),
+            left_out: [0; 2],
+            nearest: Default::default(),
+            chords: Default::default(),
+        }
+    }
+
+    /// Recomputes association and residuals of `e.state`.
+    pub(crate) fn evaluate(&self, e: &mut Evaluation, settings: &Settings) -> Result<(), FitError> {
+        e.rows.clear();
+        for view in 0..2 {
+            let mut projector = self.projectors[view].clone();
+            if view == 1 {
+                projector.set_nuisance(e.state.nuisance);
+            }
+            let half = e.state.half_px[view];
+            e.chords[view].rebuild(&e.state.spline, &projector, view as u8 + 1, self.steps)?;
+            let radius = half + settings.reach_px.max(JUDGED_PX);
+            let outline = self.outlines[view];
+            e.chords[view].nearest(outline, radius, settings.stride, &mut e.nearest[view]);
+            e.left_out[view] = self.boundary_rows(e, view, &projector, settings);
+            self.outside_rows(e, view, &projector);
+        }
+        Ok(())
+    }
+
+    /// Adds the rows of one view's outline; returns how many points looked at gave none.
+    fn boundary_rows(
+        &self,
+        e: &mut Evaluation,
+        view: usize,
+        projector: &Projector,
+        settings: &Settings,
+    ) -> usize {
+        let half = e.state.half_px[view];
+        let spline = &e.state.spline;
+        let end = spline.spans() as f64;
+        let mut left_out = 0;
+        for (i, near) in e.nearest[view].iter_mut().enumerate() {
+            if settings.stride > 1 && !is_sampled(i, settings.stride) {
+                continue;
+            }
+            if !(near.squared < (half + settings.reach_px).powi(2)) {
+                left_out += 1;
+                continue;
+            }
+            let [bx, by, inward_x, inward_y] = self.outlines[view].points[i];
+            let b = Vector2::new(bx, by);
+            // The chords are within their sag of the curve: one Gauss-Newton step of the parameter
+            // leaves an error of second order in it.
+            let (span, t) = spline.locate(near.u);
+            let x = spline.combine(span, basis(t));
+            let dx = spline.combine(span, basis_1(t));
+            let (p, jacobian) = projector.project_with_jacobian(&x);
+            let tangent = jacobian * dx;
+            let step = (b - p).dot(&tangent) / tangent.norm_squared().max(f64::MIN_POSITIVE);
+            let u = (near.u + step.clamp(-0.5, 0.5)).clamp(0.0, end);
+            let p = p + tangent * (u - near.u);
+            let out = b - p;
+            let distance = out.norm();
+            *near = Nearest { squared: distance * distance, u };
+            let outward = -(out.x * inward_x + out.y * inward_y);
+            if !(distance > MIN_DEPTH * half
+                && distance < half + settings.reach_px
+                && outward > MIN_COSINE * distance)
+            {
+                left_out += 1;
+                continue;
+            }
+            e.rows.push(row(spline, view, projector, u, &p, &jacobian, out / distance, distance));
+            if let Some(row) = e.rows.last_mut() {
+                row.point = i;
+            }
+        }
+        left_out
+    }
+
+    /// Adds the rows of curve samples outside one view's mask, about one per chord.
+    fn outside_rows(&self, e: &mut Evaluation, view: usize, projector: &Projector) {
+        let spline = &e.state.spline;
+        let chords = &e.chords[view];
+        for (k, p) in chords.points.iter().enumerate() {
+            let Some((distance, target)) = self.outside(view, p) else { continue };
+            if distance <= OUTSIDE_PX[0] || distance > OUTSIDE_PX[1] {
+                continue;
+            }
+            let u = chords.parameter(k);
+            let (span, t) = spline.locate(u);
+            let (p, jacobian) = projector.project_with_jacobian(&spline.combine(span, basis(t)));
+            let towards = (target - p) / distance;
+            let mut row = row(spline, view, projector, u, &p, &jacobian, towards, distance);
+            row.outside = true;
+            e.rows.push(row);
+        }
+    }
+
+    /// Distance and nearest allowed position of a curve sample that is not on the mask, on a bridge
+    /// or outside the image.
+    pub(crate) fn outside(&self, view: usize, p: &Vector2<f64>) -> Option<(f64, Vector2<f64>)> {
+        let outline = self.outlines[view];
+        let (width, height) = (f64::from(outline.size.width), f64::from(outline.size.height));
+        // What the image does not show cannot be judged.
+        if !(p.x > -0.5 && p.y > -0.5 && p.x < width - 0.5 && p.y < height - 0.5) {
+            return None;
+        }
+        let [x, y] = outline.outside.nearest(p.x, p.y);
+        let mut target = Vector2::new(x, y);
+        let mut distance = (target - p).norm();
+        for &[x0, y0, x1, y1] in self.bridges[view] {
+            let (a, b) = (Vector2::new(x0, y0), Vector2::new(x1, y1));
+            let e = b - a;
+            let t = (p - a).dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE);
+            let q = a + e * t.clamp(0.0, 1.0);
+            let to_bridge = (q - p).norm() - BRIDGE_HALF_PX;
+            if to_bridge < distance {
+                (distance, target) = (to_bridge, q);
+            }
+        }
+        (distance > 0.0).then_some((distance, target))
+    }
+
+    /// Twice the cost that [`OutlineProblem::assemble`] linearises.
+    pub(crate) fn cost(&self, e: &Evaluation, settings: &Settings) -> f64 {
+        let squared_scale = settings.scale_px * settings.scale_px;
+        let robust = |r: f64| squared_scale * (r * r / squared_scale).ln_1p();
+        let factor = settings.stride as f64;
+        let mut sum = 0.0;
+        for row in &e.rows {
+            sum += if row.outside {
+                self.outside_weight(e, row.view, settings) * row.distance * row.distance
+            } else {
+                factor * robust(row.distance - e.state.half_px[row.view])
+            };
+        }
+        let left_out = (e.left_out[0] + e.left_out[1]) as f64;
+        sum += factor * left_out * robust(settings.reach_px);
+        sum + smoothness(&e.state.spline, settings.lambda2, settings.lambda3)
+    }
+
+    fn outside_weight(&self, e: &Evaluation, view: usize, settings: &Settings) -> f64 {
+        let chords = &e.chords[view];
+        settings.outside_weight * chords.length_px() / (chords.points.len() - 1) as f64
+    }
+
+    /// Linearises the cost. Globals: the half thicknesses, then (if there are five) the shift and
+    /// roll of view 2.
+    pub(crate) fn assemble(
+        &self,
+        e: &Evaluation,
+        settings: &Settings,
+        normal: &mut NormalEquations,
+    ) {
+        normal.clear();
+        let squared_scale = settings.scale_px * settings.scale_px;
+        let factor = settings.stride as f64;
+        let outside = [0, 1].map(|view| self.outside_weight(e, view, settings));
+        let globals = normal.globals();
+        for row in &e.rows {
+            let mut global = [0.0; 5];
+            global[2..].copy_from_slice(&row.nuisance);
+            let (residual, weight) = if row.outside {
+                (row.distance, outside[row.view])
+            } else {
+                global[row.view] = -1.0;
+                let r = row.distance - e.state.half_px[row.view];
+                (r, factor / (1.0 + r * r / squared_scale))
+            };
+            normal.add_with_globals(
+                row.span,
+                &row.basis,
+                &row.gradient,
+                &global[..globals],
+                residual,
+                weight,
+            );
+        }
+        normal.add_smoothness(&e.state.spline.control, settings.lambda2, settings.lambda3);
+    }
+}
+
+#[allow(clippy::too_many_arguments, reason = "one row, two callers")]
+fn row(
+    spline: &UniformSpline,
+    view: usize,
+    projector: &Projector,
+    u: f64,
+    p: &Vector2<f64>,
+    jacobian: &accurate_geom::nalgebra::Matrix2x3<f64>,
+    towards: Vector2<f64>,
+    distance: f64,
+) -> Row {
+    let (span, t) = spline.locate(u);
+    let g: RowVector3<f64> = -(towards.transpose() * jacobian);
+    let nuisance = if view == 1 {
+        let roll = projector.roll_derivative(p);
+        [-towards.x, -towards.y, -towards.dot(&roll)]
+    } else {
+        [0.0; 3]
+    };
+    Row {
+        view,
+        span,
+        basis: basis(t),
+        gradient: [g.x, g.y, g.z],
+        nuisance,
+        distance,
+        outside: false,
+        point: usize::MAX,
+    }
+}
+
+/// `lambda2 |D2 c|² + lambda3 |D3 c|²`.
+pub(crate) fn smoothness(spline: &UniformSpline, lambda2: f64, lambda3: f64) -> f64 {
+    let c = &spline.control;
+    let second: f64 = c.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).norm_squared()).sum();
+    let third: f64 = c.windows(4).map(|w| (w[3] - w[0] + 3.0 * (w[1] - w[2])).norm_squared()).sum();
+    lambda2 * second + lambda3 * third
+}
