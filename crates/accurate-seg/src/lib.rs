@@ -1,1 +1,43 @@
-//! Placeholder.
+//! From an image or a probability map to a mask, and from a mask to its skeleton.
+//!
+//! - [`binarise_fixed`], [`binarise_otsu`], [`binarise_hysteresis`]: grey values to a [`Mask`];
+//! - [`keep_largest`], [`remove_smaller_than`], [`Components`]: what belongs together;
+//! - [`zhang_suen`] (as scikit-image's `skeletonize`), [`guo_hall`]: lines one pixel wide;
+//! - [`Skeleton`]: its endpoints, junctions and gaps, and its pixels for the stages that follow;
+//! - [`distance_to_background`], [`median_width_px`]: how thick the wire is.
+//!
+//! # Conventions
+//! Images are [`ndarray::Array2`] of shape `(height, width)`, indexed `[[row, col]]` = `[[y, x]]`,
+//! with pixel centres at integers. Foreground is 8-connected, background 4-connected.
+//!
+//! ```
+//! use accurate_seg::{Mask, Skeleton, median_width_px};
+//! use ndarray::Array2;
+//!
+//! // A horizontal bar, 3 px thick.
+//! let mask = Mask::from_array(Array2::from_shape_fn((7, 20), |(row, col)| {
+//!     (2..5).contains(&row) && (2..18).contains(&col)
+//! }))?;
+//! let skeleton = Skeleton::of(&mask)?;
+//! assert_eq!(skeleton.endpoints().len(), 2);
+//! assert!(skeleton.junctions()?.is_empty());
+//! assert_eq!(median_width_px(&mask)?, 3.0);
+//! # Ok::<(), accurate_seg::SegError>(())
+//! ```
+
+mod components;
+mod distance;
+mod error;
+mod mask;
+mod skeleton;
+mod thin;
+mod thin_rules;
+mod threshold;
+
+pub use components::{Components, keep_largest, remove_smaller_than};
+pub use distance::{distance_to_background, median_width_px};
+pub use error::SegError;
+pub use mask::Mask;
+pub use skeleton::Skeleton;
+pub use thin::{guo_hall, zhang_suen};
+pub use threshold::{binarise_fixed, binarise_hysteresis, binarise_otsu, otsu_level};

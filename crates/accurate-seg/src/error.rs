@@ -1,0 +1,75 @@
+use thiserror::Error;
+
+/// What makes an image, a mask or a threshold unusable.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SegError {
+    /// The array has no pixels at all.
+    #[error("image of {height} rows and {width} columns has no pixels")]
+    EmptyImage {
+        /// Rows, px.
+        height: usize,
+        /// Columns, px.
+        width: usize,
+    },
+    /// The image is larger than the labelling and distance routines can index.
+    #[error("image of {height} rows and {width} columns is too large: at most 2^32 - 1 pixels")]
+    TooLarge {
+        /// Rows, px.
+        height: usize,
+        /// Columns, px.
+        width: usize,
+    },
+    /// The mask has no foreground pixel.
+    #[error("mask of {height} rows and {width} columns has no foreground pixel")]
+    EmptyMask {
+        /// Rows, px.
+        height: usize,
+        /// Columns, px.
+        width: usize,
+    },
+    /// The mask has foreground, but not enough of it to be a curve.
+    #[error("{pixels} skeleton pixel(s) are not a curve: at least 2 are needed")]
+    TooSmall {
+        /// Skeleton pixels found.
+        pixels: usize,
+    },
+    /// Every pixel is foreground: there is no background to measure a distance to.
+    #[error("mask of {height} rows and {width} columns has no background pixel")]
+    NoBackground {
+        /// Rows, px.
+        height: usize,
+        /// Columns, px.
+        width: usize,
+    },
+    /// A pixel is NaN or infinite.
+    #[error("pixel at row {row}, column {column} is not finite: {value}")]
+    NotFinite {
+        /// Row, from 0.
+        row: usize,
+        /// Column, from 0.
+        column: usize,
+        /// Its value.
+        value: f32,
+    },
+    /// A threshold is NaN.
+    #[error("threshold `{name}` is not a number")]
+    LevelIsNan {
+        /// Which one: `level`, `low` or `high`.
+        name: &'static str,
+    },
+    /// The lower threshold of a hysteresis lies above the upper one.
+    #[error("hysteresis thresholds out of order: low {low} > high {high}")]
+    LevelsOutOfOrder {
+        /// Lower threshold, in grey values.
+        low: f32,
+        /// Upper threshold, in grey values.
+        high: f32,
+    },
+    /// All pixels are equal, so that no threshold separates two classes.
+    #[error("every pixel has the value {value}: no threshold separates two classes")]
+    Constant {
+        /// The one value.
+        value: f32,
+    },
+}
