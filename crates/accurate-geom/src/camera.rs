@@ -1,7 +1,7 @@
-use nalgebra::{Matrix3, Matrix3x4, Vector3};
+use nalgebra::{Matrix3, Matrix3x4, Vector2, Vector3};
 
 use crate::error::finite;
-use crate::{GeomError, Point2, Point3};
+use crate::{Distortion, GeomError, Point2, Point3};
 
 /// Width and height of an image, px.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -26,6 +26,7 @@ pub struct Camera {
     /// `R⁻¹` rather than `Rᵀ`: they differ when `R` comes from a rounded file, and only the inverse
     /// makes rays, centre and `F` agree with the projection as given.
     r_inverse: Matrix3<f64>,
+    distortion: Option<Distortion>,
 }
 
 impl Camera {
@@ -85,7 +86,21 @@ impl Camera {
             0.0,      0.0,            1.0,
         );
         let r_inverse = r.try_inverse().unwrap_or_else(|| r.transpose());
-        Ok(Self { k, r, t, size, k_inverse, r_inverse })
+        Ok(Self { k, r, t, size, k_inverse, r_inverse, distortion: None })
+    }
+
+    /// The same camera behind a lens with `distortion`.
+    ///
+    /// # Errors
+    /// [`GeomError::NotFinite`] for a coefficient that is not finite.
+    pub fn with_distortion(self, distortion: Distortion) -> Result<Self, GeomError> {
+        distortion.check()?;
+        Ok(Self { distortion: Some(distortion), ..self })
+    }
+
+    /// The lens distortion, if any.
+    pub fn distortion(&self) -> Option<&Distortion> {
+        self.distortion.as_ref()
     }
 
     /// Intrinsic matrix, px.
@@ -137,7 +152,9 @@ impl Camera {
         self.r.row(2).transpose().dot(&point.coords) + self.t.z
     }
 
-    /// The (undistorted) image of a world point, px.
+    /// The ideal (undistorted) image of a world point, px. The lens is left out on purpose: all
+    /// geometry works on points that [`undistort`](Self::undistort) has freed from it once;
+    /// [`distort`](Self::distort) gives the position in the recorded image.
     ///
     /// # Errors
     /// [`GeomError::NotInFront`] if the depth is not positive (or NaN).
@@ -148,6 +165,48 @@ impl Camera {
         }
         let p = self.k * (x_cam / x_cam.z);
         Ok(Point2::new(p.x, p.y))
+    }
+
+    /// Where the lens puts an ideal image point, px. Without distortion the point itself.
+    ///
+    /// # Errors
+    /// [`GeomError::NotFinite`] if the point is not finite or the polynomial overflows.
+    pub fn distort(&self, ideal: &Point2) -> Result<Point2, GeomError> {
+        let distorted = match &self.distortion {
+            None => *ideal,
+            Some(lens) => {
+                self.pixel_from_normalised(&lens.distort(&self.normalised_from_pixel(ideal)))
+            }
+        };
+        finite(distorted.x, || "distorted x".into())?;
+        finite(distorted.y, || "distorted y".into())?;
+        Ok(distorted)
+    }
+
+    /// The ideal position of a point of the recorded image, px: the inverse of
+    /// [`distort`](Self::distort), by Newton's method. Without distortion the point itself.
+    ///
+    /// # Errors
+    /// [`GeomError::NotFinite`], [`GeomError::NoConvergence`] if no ideal point is found, and
+    /// [`GeomError::DistortionFolds`] if the model is not one to one between the principal point
+    /// and there.
+    pub fn undistort(&self, distorted: &Point2) -> Result<Point2, GeomError> {
+        let (x, y) = (distorted.x, distorted.y);
+        finite(x, || "distorted x".into())?;
+        finite(y, || "distorted y".into())?;
+        let Some(lens) = &self.distortion else { return Ok(*distorted) };
+        match lens.undistort(&self.normalised_from_pixel(distorted))? {
+            Some(ideal) => Ok(self.pixel_from_normalised(&ideal)),
+            None => Err(GeomError::DistortionFolds { x, y }),
+        }
+    }
+
+    fn normalised_from_pixel(&self, p: &Point2) -> Vector2<f64> {
+        (self.k_inverse * Vector3::new(p.x, p.y, 1.0)).xy()
+    }
+
+    fn pixel_from_normalised(&self, x: &Vector2<f64>) -> Point2 {
+        Point2::from((self.k * x.push(1.0)).xy())
     }
 
     /// Direction of the ray through an (undistorted) image point, in the world frame, pointing away

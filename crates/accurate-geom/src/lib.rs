@@ -10,21 +10,39 @@
 //!   `p1ᵀ F p2 = 0`: it turns a pixel of view 2 into its epipolar line in view 1.
 //! - Everything is `f64`. A value that left a constructor is finite and not degenerate.
 
+// `!(x > limit)` refuses NaN together with too small values; `x <= limit` would let it through.
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
+
+mod banded;
+mod bspline;
+mod bspline_closest;
+mod bspline_fit;
+mod bspline_length;
+mod bspline_line;
 mod camera;
+mod distortion;
 mod epipolar;
+mod epipolar_angle;
 mod error;
 mod pixel;
+mod polyline;
+mod projection_matrix;
 mod rig;
 mod triangulate;
 mod unit;
 
+pub use bspline::{BSpline, Basis, Curve2, Curve3, Jet};
+pub use bspline_closest::ClosestOnCurve;
 pub use camera::{Camera, ImageSize, nearest_rotation};
+pub use distortion::Distortion;
 pub use epipolar::{
     EpipolarLine, Fundamental, epipolar_distance, sampson_distance, symmetric_epipolar_distance,
 };
+pub use epipolar_angle::{AngleSample, EpipolarAngle};
 pub use error::GeomError;
 pub use nalgebra;
 pub use pixel::{Pixel, View, View1, View2};
+pub use polyline::{ClosestOnPolyline, Polyline, Polyline2, Polyline3};
 pub use rig::Rig;
 pub use triangulate::{Triangulation, Triangulator, UnknownTriangulation};
 pub use unit::{LengthUnit, UnknownUnit};

@@ -19,7 +19,8 @@ pub enum Triangulation {
     /// The midpoint of the shortest segment between the rays. Minimises a distance of the world.
     Midpoint,
     /// The two pixels moved least so that their rays meet, by two Lindstrom steps in closed form,
-    /// then the point where they meet. The default: optimal to rounding for errors of a few pixels.
+    /// then the point where they meet. The default: for errors of a few pixels the cost is within
+    /// about 10⁻⁶ of the least.
     #[default]
     LindstromNiter2,
     /// Least sum of squared reprojection errors by iteration, started at [`Self::Dlt`] and never
