@@ -1,1 +1,53 @@
-//! Placeholder.
+//! The files of `accurate`: pair folders, cameras, images and curves, read with care and written
+//! whole or not at all.
+//!
+//! - [`read_pair`], [`write_pair`], [`find_pairs`]: the pair folder, the native input.
+//! - [`read_rig`], [`write_rig`]: two cameras in one TOML or JSON file.
+//! - [`read_curve`], [`write_curve`]: 3D curves as CSV, PLY, VTK PolyData or NPY.
+//! - [`read_grey`], [`read_mask`] and their writers: images as arrays `[[y, x]]`.
+//! - [`read_manifest`]: what a data set is, where it comes from and under which licence.
+//!
+//! # What is promised
+//! - A file is untrusted: a size it declares is compared with the bytes that are there before
+//!   memory is taken, and whatever is wrong becomes an [`IoError`] with file, place and value.
+//! - No NaN or infinity is read or written.
+//! - Every file is written to a temporary name, synced and renamed ([`write_atomically`]).
+//! - What is written reads back to the same bits.
+
+mod atomic;
+mod bounded;
+mod calibration;
+mod curve;
+mod curve_csv;
+mod error;
+mod find;
+mod finite_check;
+mod image_file;
+mod json;
+mod manifest;
+mod matrix;
+mod meta;
+mod npy;
+mod pair;
+mod pair_write;
+mod ply;
+mod points;
+mod rig_file;
+mod vtp;
+
+pub use atomic::{remove_unfinished, write_atomically};
+pub use curve::{Column, CurveTable, read_curve, write_curve};
+pub use error::IoError;
+pub use find::find_pairs;
+pub use image_file::{
+    BitDepth, GreyImage, MAX_IMAGE_SIDE_PX, read_grey, read_image_size, read_mask, write_grey,
+    write_mask, write_u8, write_u16,
+};
+pub use json::write_json;
+pub use manifest::{Generator, Manifest, ManifestFile, Split, read_manifest, read_manifests};
+pub use matrix::{read_matrix3, read_matrix3x4, write_matrix3, write_matrix3x4};
+pub use pair::{OrderedPoints, Pair, PairParts, Truth, read_pair};
+pub use pair_write::{PairContents, write_pair};
+pub use ply::{PlyEncoding, read_ply_points, write_ply_points};
+pub use points::{read_points, write_points};
+pub use rig_file::{read_rig, write_rig};

@@ -1,0 +1,148 @@
+use std::path::Path;
+
+use accurate_geom::{LengthUnit, Point3};
+use ndarray::Array2;
+use ndarray_npy::npy::header::Header;
+use ndarray_npy::{ReadNpyExt, WriteNpyExt};
+
+use crate::IoError;
+use crate::atomic::write_atomically;
+use crate::bounded::{MAX_POINTS_BYTES, read_bytes};
+use crate::curve::CurveTable;
+
+/// Largest accepted header, bytes; NumPy itself writes 118 for such an array.
+const MAX_HEADER_BYTES: usize = 4096;
+/// Deepest accepted bracket in the header; `{'shape': (N, 3)}` has two. The header is a Python
+/// literal, and its parser recurses.
+const MAX_NESTING: usize = 4;
+
+pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
+    let bytes = read_bytes(path, MAX_POINTS_BYTES)?;
+    let malformed = |reason: String| IoError::malformed(path, "NPY", None, reason);
+    let data_length = check_header(&bytes).map_err(malformed)?;
+    let header =
+        Header::from_reader(&mut bytes.as_slice()).map_err(|e| malformed(e.to_string()))?;
+    let descriptor = header.type_descriptor.to_string();
+    let item_bytes = match descriptor.trim_matches('\'') {
+        "<f8" | ">f8" => 8,
+        "<f4" | ">f4" => 4,
+        _ => {
+            return Err(IoError::Unsupported {
+                path: path.to_owned(),
+                what: format!(
+                    "element type {}; expected f8 or f4",
+                    crate::error::cut(&descriptor, 40)
+                ),
+            });
+        }
+    };
+    let [rows, 3] = header.shape[..] else {
+        return Err(malformed(format!("shape {:?}; expected (N, 3)", header.shape)));
+    };
+    // The shape is a claim of the file: compare it with the bytes before memory is taken for it.
+    if rows.checked_mul(3 * item_bytes) != Some(data_length) {
+        return Err(malformed(format!("shape {:?} but {data_length} bytes of data", header.shape)));
+    }
+    if rows == 0 {
+        return Err(IoError::Empty { path: path.to_owned(), what: "points" });
+    }
+    let array = if item_bytes == 8 {
+        Array2::<f64>::read_npy(bytes.as_slice())
+    } else {
+        Array2::<f32>::read_npy(bytes.as_slice()).map(|a| a.mapv(f64::from))
+    }
+    .map_err(|e| malformed(e.to_string()))?;
+    let points = array.rows().into_iter().map(|r| Point3::from_slice(&r.to_vec())).collect();
+    Ok(CurveTable::from_points(points, LengthUnit::Unit))
+}
+
+pub(crate) fn write(path: &Path, curve: &CurveTable) -> Result<(), IoError> {
+    let values = curve.points.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
+    let failed = |e: String| IoError::system(path, "encode", std::io::Error::other(e));
+    let array = Array2::from_shape_vec((curve.points.len(), 3), values)
+        .map_err(|e| failed(e.to_string()))?;
+    let mut bytes = Vec::new();
+    array.write_npy(&mut bytes).map_err(|e| failed(e.to_string()))?;
+    write_atomically(path, |w| w.write_all(&bytes))
+}
+
+/// Refuses a header the parser should not see, and returns the number of bytes behind it.
+fn check_header(bytes: &[u8]) -> Result<usize, String> {
+    let short = || "the file ends within the header".to_owned();
+    let major = *bytes.get(6).ok_or_else(short)?;
+    let (length, start) = if major == 1 {
+        let field: [u8; 2] = bytes.get(8..10).and_then(|b| b.try_into().ok()).ok_or_else(short)?;
+        (u32::from(u16::from_le_bytes(field)), 10)
+    } else {
+        let field: [u8; 4] = bytes.get(8..12).and_then(|b| b.try_into().ok()).ok_or_else(short)?;
+        (u32::from_le_bytes(field), 12)
+    };
+    let length = length as usize;
+    if length > MAX_HEADER_BYTES {
+        return Err(format!("the header declares {length} bytes; at most {MAX_HEADER_BYTES}"));
+    }
+    let header = bytes.get(start..start + length).ok_or_else(short)?;
+    let mut depth = 0_usize;
+    for byte in header {
+        match byte {
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        if depth > MAX_NESTING {
+            return Err(format!("brackets in the header nest deeper than {MAX_NESTING}"));
+        }
+    }
+    Ok(bytes.len() - start - length)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn read_raw(header: &str, data: &[u8]) -> Result<CurveTable, IoError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("curve.npy");
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((header.len() as u16 + 1).to_le_bytes());
+        bytes.extend(header.as_bytes());
+        bytes.push(b'\n');
+        bytes.extend(data);
+        fs::write(&path, bytes).unwrap();
+        read(&path)
+    }
+
+    #[test]
+    fn fortran_order_and_single_precision_are_read() {
+        let data: Vec<u8> =
+            [1.0_f32, 2.0, 3.0, 4.0, 5.0, 6.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let header = "{'descr': '<f4', 'fortran_order': True, 'shape': (2, 3), }";
+        let curve = read_raw(header, &data).unwrap();
+        assert_eq!(curve.points, [Point3::new(1.0, 3.0, 5.0), Point3::new(2.0, 4.0, 6.0)]);
+    }
+
+    #[test]
+    fn a_shape_beyond_the_file_is_refused_before_memory_is_taken() {
+        for shape in ["(1000000000000, 3)", "(18446744073709551615, 3)", "(1, 3)", "(3, 1)", "()"] {
+            let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}");
+            let error = read_raw(&header, &[0; 48]).unwrap_err();
+            assert!(matches!(error, IoError::Malformed { .. }), "{shape}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_nest_of_brackets_does_not_reach_the_recursive_parser() {
+        let error = read_raw(&"(".repeat(4000), &[]).unwrap_err();
+        assert!(error.to_string().contains("nest deeper"), "{error}");
+        let error = read_raw(&"(".repeat(60_000), &[]).unwrap_err();
+        assert!(error.to_string().contains("at most 4096"), "{error}");
+    }
+
+    #[test]
+    fn integers_are_refused_by_name() {
+        let header = "{'descr': '<i8', 'fortran_order': False, 'shape': (1, 3)}";
+        let error = read_raw(header, &[0; 24]).unwrap_err();
+        assert!(error.to_string().contains("'<i8'"), "{error}");
+    }
+}

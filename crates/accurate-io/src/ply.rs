@@ -1,0 +1,417 @@
+use std::io::{BufRead, Cursor};
+use std::path::Path;
+
+use accurate_geom::{LengthUnit, Point3};
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{
+    ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
+    ScalarType,
+};
+
+use crate::IoError;
+use crate::atomic::write_atomically;
+use crate::bounded::{MAX_POINTS_BYTES, read_bytes};
+use crate::curve::{Column, CurveTable};
+use crate::matrix::{finite, parse_number};
+
+/// How numbers are stored in a PLY file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum PlyEncoding {
+    /// One line of text per point.
+    Ascii,
+    /// Little-endian bytes: what most tools write.
+    BinaryLittleEndian,
+    /// Big-endian bytes.
+    BinaryBigEndian,
+}
+
+/// Reads the points of a PLY file in order: `x`, `y`, `z` of element `vertex`, ASCII or binary of
+/// either byte order, float, double or integer. Other elements and properties are skipped.
+///
+/// # Errors
+/// [`IoError::Malformed`]; [`IoError::TooLarge`] if the header declares more elements than the file
+/// has bytes for, before memory is taken; [`IoError::NotFinite`]; [`IoError::Empty`];
+/// [`IoError::Missing`].
+pub fn read_ply_points(path: &Path) -> Result<Vec<Point3>, IoError> {
+    let (points, _) = parse(path)?;
+    for (i, p) in points.iter().enumerate() {
+        for (name, value) in ["x", "y", "z"].iter().zip(p.coords.iter()) {
+            finite(path, *value, || format!("{name} of point {i}"))?;
+        }
+    }
+    if points.is_empty() {
+        return Err(IoError::Empty { path: path.to_owned(), what: "points" });
+    }
+    Ok(points)
+}
+
+/// Writes points as doubles; reading them gives the same bits.
+///
+/// # Errors
+/// [`IoError::Empty`], [`IoError::NotFinite`], [`IoError::System`].
+pub fn write_ply_points(
+    path: &Path,
+    points: &[Point3],
+    encoding: PlyEncoding,
+) -> Result<(), IoError> {
+    if points.is_empty() {
+        return Err(IoError::Empty { path: path.to_owned(), what: "points" });
+    }
+    for (i, p) in points.iter().enumerate() {
+        for (name, value) in ["x", "y", "z"].iter().zip(p.coords.iter()) {
+            finite(path, *value, || format!("{name} of point {i}"))?;
+        }
+    }
+    write(path, &CurveTable::from_points(points.to_vec(), LengthUnit::Unit), encoding)
+}
+
+/// Points with the further scalar properties of `vertex` as columns. Units are our own comments
+/// `unit mm` and `column NAME UNIT`.
+pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
+    let (points, (mut columns, comments)) = parse(path)?;
+    let mut unit = LengthUnit::Unit;
+    for comment in comments {
+        let mut words = comment.trim().splitn(3, ' ');
+        match (words.next(), words.next(), words.next()) {
+            (Some("unit"), Some(label), None) => unit = label.parse().unwrap_or(unit),
+            (Some("column"), Some(name), Some(label)) => {
+                if let Some(column) = columns.iter_mut().find(|c| c.name == name) {
+                    column.unit = label.trim().to_owned();
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(CurveTable { unit, points, columns })
+}
+
+pub(crate) fn write(path: &Path, curve: &CurveTable, encoding: PlyEncoding) -> Result<(), IoError> {
+    let format = match encoding {
+        PlyEncoding::Ascii => "ascii",
+        PlyEncoding::BinaryLittleEndian => "binary_little_endian",
+        PlyEncoding::BinaryBigEndian => "binary_big_endian",
+    };
+    write_atomically(path, |w| {
+        writeln!(w, "ply\nformat {format} 1.0\ncomment unit {}", curve.unit)?;
+        for column in curve.columns.iter().filter(|c| !c.unit.is_empty()) {
+            writeln!(w, "comment column {} {}", column.name, column.unit)?;
+        }
+        writeln!(w, "element vertex {}", curve.points.len())?;
+        let names = curve.columns.iter().map(|c| c.name.as_str());
+        for name in ["x", "y", "z"].into_iter().chain(names) {
+            writeln!(w, "property double {name}")?;
+        }
+        writeln!(w, "end_header")?;
+        for (i, p) in curve.points.iter().enumerate() {
+            let further = curve.columns.iter().filter_map(|c| c.values.get(i));
+            for (k, value) in p.coords.iter().chain(further).enumerate() {
+                match encoding {
+                    PlyEncoding::Ascii if k == 0 => write!(w, "{value:?}")?,
+                    PlyEncoding::Ascii => write!(w, " {value:?}")?,
+                    PlyEncoding::BinaryLittleEndian => w.write_all(&value.to_le_bytes())?,
+                    PlyEncoding::BinaryBigEndian => w.write_all(&value.to_be_bytes())?,
+                }
+            }
+            if encoding == PlyEncoding::Ascii {
+                writeln!(w)?;
+            }
+        }
+        Ok(())
+    })
+}
+
+type Rest = (Vec<Column>, Vec<String>);
+
+/// Points, columns and comments, not yet checked for NaN.
+fn parse(path: &Path) -> Result<(Vec<Point3>, Rest), IoError> {
+    let bytes = read_bytes(path, MAX_POINTS_BYTES)?;
+    let malformed =
+        |line, reason: &dyn ToString| IoError::malformed(path, "PLY", line, reason.to_string());
+    let mut reader = Reader::new(Cursor::new(bytes.as_slice()));
+    let header = Parser::<Scalars>::new()
+        .read_header(&mut reader)
+        .map_err(|e| malformed(e.line(), &e.to_string().replace("\n\t", " ")))?;
+    let line_of_data = reader.line();
+    let remaining = bytes.len() as u64 - reader.get_ref().position().min(bytes.len() as u64);
+    check_counts(path, &header, remaining)?;
+
+    let vertex = header
+        .elements
+        .iter()
+        .find(|(name, _)| name.as_str() == "vertex")
+        .map(|(_, element)| element)
+        .ok_or_else(|| malformed(None, &"no element `vertex`"))?;
+    let scalars: Vec<&str> = vertex
+        .properties
+        .iter()
+        .filter(|(_, p)| matches!(p.data_type, PropertyType::Scalar(_)))
+        .map(|(name, _)| name.as_str())
+        .collect();
+    let place = |name: &str| {
+        scalars.iter().position(|s| *s == name).ok_or_else(|| {
+            malformed(None, &format!("element `vertex` has no scalar property `{name}`"))
+        })
+    };
+    let xyz = [place("x")?, place("y")?, place("z")?];
+
+    let rows = match header.encoding {
+        Encoding::Ascii => ascii_rows(path, reader.into_inner(), line_of_data, &header, vertex)?,
+        _ => binary_rows(reader, &header).map_err(|reason| malformed(None, &reason))?,
+    };
+    let mut points = Vec::with_capacity(rows.len());
+    let mut columns: Vec<Column> = scalars
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| !xyz.contains(i))
+        .map(|(_, name)| Column {
+            name: (*name).to_owned(),
+            unit: String::new(),
+            values: Vec::new(),
+        })
+        .collect();
+    for (i, row) in rows.iter().enumerate() {
+        let [Some(&x), Some(&y), Some(&z)] = xyz.map(|k| row.get(k)) else {
+            return Err(malformed(None, &format!("vertex {i} lacks a coordinate")));
+        };
+        points.push(Point3::new(x, y, z));
+        let further = row.iter().enumerate().filter(|(k, _)| !xyz.contains(k));
+        for (column, (_, value)) in columns.iter_mut().zip(further) {
+            column.values.push(*value);
+        }
+    }
+    Ok((points, (columns, header.comments)))
+}
+
+/// Compares what the header declares with the bytes behind it.
+fn check_counts(path: &Path, header: &Header, remaining: u64) -> Result<(), IoError> {
+    let mut left = remaining;
+    for (name, element) in &header.elements {
+        let least_bytes: u64 = element
+            .properties
+            .iter()
+            .map(|(_, property)| match (header.encoding, &property.data_type) {
+                // A digit and a separator; the very last separator may be missing.
+                (Encoding::Ascii, _) => 2,
+                (_, PropertyType::Scalar(scalar)) => scalar_bytes(scalar),
+                (_, PropertyType::List(length, _)) => scalar_bytes(length),
+            })
+            .sum();
+        let count = element.count as u64;
+        // An element without properties costs no bytes: nothing would bound its count.
+        let fitting = (left + 1).checked_div(least_bytes).unwrap_or(0);
+        if count > fitting {
+            return Err(IoError::TooLarge {
+                path: path.to_owned(),
+                what: format!("declared number of `{}`", crate::error::cut(name, 40)),
+                found: count,
+                limit: fitting,
+            });
+        }
+        left = left.saturating_sub(count * least_bytes);
+    }
+    Ok(())
+}
+
+fn scalar_bytes(scalar: &ScalarType) -> u64 {
+    match scalar {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
+}
+
+/// The scalars of each vertex. Lines are split here, because the parser's grammar refuses `1.` and
+/// cannot say which number is NaN.
+fn ascii_rows(
+    path: &Path,
+    mut data: Cursor<&[u8]>,
+    mut line: usize,
+    header: &Header,
+    vertex: &ElementDef,
+) -> Result<Vec<Vec<f64>>, IoError> {
+    let malformed = |line, reason: &str| IoError::malformed(path, "PLY", Some(line), reason);
+    let mut rows = Vec::new();
+    let mut text = Vec::new();
+    for (_, element) in &header.elements {
+        let wanted = element.name == vertex.name;
+        for _ in 0..element.count {
+            text.clear();
+            let read =
+                data.read_until(b'\n', &mut text).map_err(|e| IoError::system(path, "read", e))?;
+            if read == 0 {
+                return Err(malformed(line, &format!("the file ends within `{}`", element.name)));
+            }
+            if wanted {
+                let text = std::str::from_utf8(&text).map_err(|_| malformed(line, "not text"))?;
+                rows.push(ascii_row(path, line, text, vertex)?);
+            }
+            line += 1;
+        }
+        if wanted {
+            break;
+        }
+    }
+    Ok(rows)
+}
+
+fn ascii_row(
+    path: &Path,
+    line: usize,
+    text: &str,
+    vertex: &ElementDef,
+) -> Result<Vec<f64>, IoError> {
+    let mut fields = text.split_whitespace().enumerate();
+    let mut next = || match fields.next() {
+        Some((column, field)) => parse_number(path, line, column + 1, field),
+        None => Err(IoError::malformed(path, "PLY", Some(line), "too few numbers")),
+    };
+    let mut row = Vec::with_capacity(vertex.properties.len());
+    for (_, property) in &vertex.properties {
+        match property.data_type {
+            PropertyType::Scalar(_) => row.push(next()?),
+            PropertyType::List(..) => {
+                let length = next()?;
+                if !(0.0..=text.len() as f64).contains(&length) {
+                    return Err(IoError::malformed(path, "PLY", Some(line), "list too long"));
+                }
+                for _ in 0..length as usize {
+                    next()?;
+                }
+            }
+        }
+    }
+    Ok(row)
+}
+
+fn binary_rows(
+    mut reader: Reader<Cursor<&[u8]>>,
+    header: &Header,
+) -> Result<Vec<Vec<f64>>, String> {
+    let parser = Parser::<Scalars>::new();
+    for (name, element) in &header.elements {
+        let rows = parser
+            .read_payload_for_element(&mut reader, element, header)
+            .map_err(|e| e.to_string().replace("\n\t", " "))?;
+        if name == "vertex" {
+            return Ok(rows.into_iter().map(|r| r.0).collect());
+        }
+    }
+    Ok(Vec::new())
+}
+
+/// The scalar properties of an element in the order of the header; lists are dropped.
+struct Scalars(Vec<f64>);
+
+impl PropertyAccess for Scalars {
+    fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    fn set_property(&mut self, _: &str, property: Property) -> PropertyAccessResult {
+        let value = match property {
+            Property::Char(v) => f64::from(v),
+            Property::UChar(v) => f64::from(v),
+            Property::Short(v) => f64::from(v),
+            Property::UShort(v) => f64::from(v),
+            Property::Int(v) => f64::from(v),
+            Property::UInt(v) => f64::from(v),
+            Property::Float(v) => f64::from(v),
+            Property::Double(v) => v,
+            _ => return PropertyAccessResult::Ignored,
+        };
+        self.0.push(value);
+        PropertyAccessResult::Set
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn read_raw(bytes: &[u8]) -> Result<Vec<Point3>, IoError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("truth.ply");
+        fs::write(&path, bytes).unwrap();
+        read_ply_points(&path)
+    }
+
+    #[test]
+    fn foreign_elements_lists_and_the_order_of_properties_do_not_matter() {
+        let text = "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nelement camera 1\r\n\
+            property list uchar int ids\r\nelement vertex 2\r\nproperty uchar red\r\n\
+            property float z\r\nproperty list uchar float w\r\nproperty float x\r\n\
+            property float y\r\nend_header\r\n2 7 8\r\n255 3. 1 9 1e0 -.5\r\n0 6 0 4 5";
+        let points = read_raw(text.as_bytes()).unwrap();
+        assert_eq!(points, [Point3::new(1.0, -0.5, 3.0), Point3::new(4.0, 5.0, 6.0)]);
+    }
+
+    #[test]
+    fn binary_floats_with_colours_are_read_in_both_byte_orders() {
+        for (name, big) in [("binary_little_endian", false), ("binary_big_endian", true)] {
+            let mut bytes = format!(
+                "ply\nformat {name} 1.0\nelement vertex 2\nproperty float x\nproperty float y\n\
+                 property float z\nproperty uchar red\nend_header\n"
+            )
+            .into_bytes();
+            for row in [[1.5_f32, -2.0, 3.0], [4.0, 5.0, 6.25]] {
+                for v in row {
+                    bytes.extend(if big { v.to_be_bytes() } else { v.to_le_bytes() });
+                }
+                bytes.push(200);
+            }
+            let points = read_raw(&bytes).unwrap();
+            assert_eq!(points, [Point3::new(1.5, -2.0, 3.0), Point3::new(4.0, 5.0, 6.25)]);
+            // One byte short of what the header declares.
+            let error = read_raw(&bytes[..bytes.len() - 1]).unwrap_err();
+            assert!(
+                matches!(error, IoError::Malformed { .. } | IoError::TooLarge { .. }),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_count_beyond_the_file_is_refused_before_memory_is_taken() {
+        for (format, property) in [
+            ("ascii", "property float x"),
+            ("binary_little_endian", "property double x"),
+            ("binary_little_endian", "property list uchar double x"),
+            ("ascii", "comment an element without properties costs no bytes"),
+        ] {
+            let text = format!(
+                "ply\nformat {format} 1.0\nelement vertex 1000000000000\n{property}\nend_header\n1 2 3\n"
+            );
+            let error = read_raw(text.as_bytes()).unwrap_err();
+            assert!(
+                matches!(error, IoError::TooLarge { found: 1_000_000_000_000, .. }),
+                "{property}: {error}"
+            );
+        }
+    }
+
+    #[test]
+    fn each_defect_names_its_line() {
+        let head = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+            property float z\nend_header\n";
+        let cases = [
+            ("1 nan 3\n", "line 8, column 2 is not finite: NaN"),
+            ("1 2 x\n", "line 8, column 3: `x` is not a number"),
+            ("1 22222\n", "line 8: not valid PLY: too few numbers"),
+        ];
+        for (data, expected) in cases {
+            let error = read_raw(format!("{head}{data}").as_bytes()).unwrap_err().to_string();
+            assert!(error.ends_with(expected), "{error}");
+        }
+        for (text, expected) in [
+            (head.replace("float y", "list uchar int y") + "1 2 3 4\n", "no scalar property `y`"),
+            (head.replace("vertex 1", "vertex 0"), "no points"),
+            (head.replace("vertex", "point") + "1 2 3\n", "no element `vertex`"),
+            ("plx\n".to_owned(), "not valid PLY"),
+        ] {
+            let error = read_raw(text.as_bytes()).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

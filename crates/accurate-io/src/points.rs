@@ -1,0 +1,153 @@
+use std::path::Path;
+
+use accurate_geom::{Pixel, View};
+
+use crate::IoError;
+use crate::atomic::write_atomically;
+use crate::bounded::{MAX_POINTS_BYTES, read_bytes};
+use crate::matrix::{finite, parse_number};
+
+/// Reads ordered centreline points (`points_L.csv`) of view `V`: a header with the columns `x` and
+/// `y` in px, then one point per line, in order. Other columns are ignored. Points may lie outside
+/// the image.
+///
+/// # Errors
+/// [`IoError::NotANumber`] or [`IoError::NotFinite`] with line and column; [`IoError::Malformed`]
+/// for a missing header or a ragged line; [`IoError::Empty`] without points;
+/// [`IoError::Missing`], [`IoError::TooLarge`] above 256 MiB.
+pub fn read_points<V: View>(path: &Path) -> Result<Vec<Pixel<V>>, IoError> {
+    let table = CsvTable::read(path)?;
+    let (x, y) = (table.column("x")?, table.column("y")?);
+    let mut points = Vec::new();
+    table.for_each_row(|line, row| {
+        let number = |c: usize| parse_number(path, line, c + 1, row.get(c).unwrap_or_default());
+        points.push(Pixel::new(number(x)?, number(y)?));
+        Ok(())
+    })?;
+    if points.is_empty() {
+        return Err(IoError::Empty { path: path.to_owned(), what: "points" });
+    }
+    Ok(points)
+}
+
+/// Writes ordered centreline points; reading them gives the same bits.
+///
+/// # Errors
+/// [`IoError::Empty`], [`IoError::NotFinite`], [`IoError::System`].
+pub fn write_points<V: View>(path: &Path, points: &[Pixel<V>]) -> Result<(), IoError> {
+    check_points(path, points)?;
+    write_atomically(path, |w| {
+        writeln!(w, "x,y")?;
+        points.iter().try_for_each(|p| writeln!(w, "{:?},{:?}", p.x, p.y))
+    })
+}
+
+pub(crate) fn check_points<V: View>(path: &Path, points: &[Pixel<V>]) -> Result<(), IoError> {
+    if points.is_empty() {
+        return Err(IoError::Empty { path: path.to_owned(), what: "points" });
+    }
+    for (i, p) in points.iter().enumerate() {
+        finite(path, p.x, || format!("x of point {i}"))?;
+        finite(path, p.y, || format!("y of point {i}"))?;
+    }
+    Ok(())
+}
+
+/// A CSV file with a header, in memory.
+pub(crate) struct CsvTable<'p> {
+    path: &'p Path,
+    bytes: Vec<u8>,
+    pub(crate) header: Vec<String>,
+}
+
+impl<'p> CsvTable<'p> {
+    pub(crate) fn read(path: &'p Path) -> Result<Self, IoError> {
+        let bytes = read_bytes(path, MAX_POINTS_BYTES)?;
+        let header = reader(&bytes)
+            .headers()
+            .map_err(|e| malformed(path, &e))?
+            .iter()
+            .map(str::to_owned)
+            .collect();
+        Ok(Self { path, bytes, header })
+    }
+
+    /// Index of the column `name`.
+    pub(crate) fn column(&self, name: &str) -> Result<usize, IoError> {
+        self.header.iter().position(|h| h == name).ok_or_else(|| {
+            IoError::malformed(
+                self.path,
+                "CSV",
+                Some(1),
+                format!("no column `{name}` in the header"),
+            )
+        })
+    }
+
+    /// Calls `visit` with the line (from 1) and the fields of every row below the header.
+    pub(crate) fn for_each_row(
+        &self,
+        mut visit: impl FnMut(usize, &csv::StringRecord) -> Result<(), IoError>,
+    ) -> Result<(), IoError> {
+        let mut reader = reader(&self.bytes);
+        let mut row = csv::StringRecord::new();
+        while reader.read_record(&mut row).map_err(|e| malformed(self.path, &e))? {
+            let line = row.position().map_or(0, |p| p.line() as usize);
+            visit(line, &row)?;
+        }
+        Ok(())
+    }
+}
+
+fn reader(bytes: &[u8]) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes)
+}
+
+fn malformed(path: &Path, error: &csv::Error) -> IoError {
+    let line = error.position().map(|p| p.line() as usize);
+    let reason = match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("{len} fields where the header has {expected_len}")
+        }
+        csv::ErrorKind::Utf8 { .. } => "not UTF-8 text".to_owned(),
+        _ => error.to_string(),
+    };
+    IoError::malformed(path, "CSV", line, reason)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use accurate_geom::View1;
+    use std::fs;
+
+    fn read(text: &[u8]) -> Result<Vec<Pixel<View1>>, IoError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("points_L.csv");
+        fs::write(&path, text).unwrap();
+        read_points(&path)
+    }
+
+    #[test]
+    fn columns_are_found_by_name_and_negative_pixels_are_kept() {
+        let points = read(b"y, x ,radius\r\n774.1,-7.03,0.4\r\n5,6,7\r\n").unwrap();
+        assert_eq!(points, [Pixel::new(-7.03, 774.1), Pixel::new(6.0, 5.0)]);
+    }
+
+    #[test]
+    fn each_defect_names_its_line() {
+        let cases: [(&[u8], &str); 7] = [
+            (b"", "no column `x` in the header"),
+            (b"x,y\n", "no points"),
+            (b"1,2\n3,4\n", "no column `x` in the header"),
+            (b"x,y\n1,2\n3\n", "line 3: not valid CSV: 1 fields where the header has 2"),
+            (b"x,y\n1,2\n3,a\n", "line 3, column 2: `a` is not a number"),
+            (b"x,y\n1,inf\n", "line 2, column 2 is not finite: inf"),
+            (b"x,y\n1,\xff\n", "not UTF-8 text"),
+        ];
+        for (text, expected) in cases {
+            let error = read(text).unwrap_err().to_string();
+            assert!(error.ends_with(expected), "{text:?}: {error}");
+        }
+    }
+}
