@@ -115,8 +115,8 @@ fn link(rows: &[usize], rank: impl Fn(usize) -> usize, ranks: usize) -> Vec<Link
             let (length, previous) = before.map_or((1, None), |(n, Reverse(p))| (n + 1, Some(p)));
             links.push(Link { length, previous });
         }
-        for k in start..end {
-            tree.enter(rank(k), (links[k].length, Reverse(k)));
+        for (k, entered) in links.iter().enumerate().skip(start) {
+            tree.enter(rank(k), (entered.length, Reverse(k)));
         }
         start = end;
     }

@@ -59,7 +59,7 @@ impl Pchip {
     /// The value at `x`; outside the knots, the value at the nearer end.
     pub fn value(&self, x: f64) -> f64 {
         let last = self.x.len() - 1;
-        if !(x > self.x[0]) {
+        if x <= self.x[0] || x.is_nan() {
             return self.y[0];
         }
         if x >= self.x[last] {

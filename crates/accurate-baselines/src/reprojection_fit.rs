@@ -58,7 +58,7 @@ pub(crate) fn fit(
     prior: &Prior,
 ) -> Option<Fit> {
     let (first, last) = (observations.first()?, observations.last()?);
-    if !(last.t > first.t) {
+    if last.t <= first.t {
         return None;
     }
     let mut spline = UniformSpline::zero(first.t, last.t, spans);
@@ -293,7 +293,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// The image of a point, px, and its derivative, px per world unit; `None` if it is not in front.
 fn project(camera: &Camera, point: &Point3) -> Option<(Vector2<f64>, Matrix2x3<f64>)> {
     let in_camera = camera.r() * point.coords + camera.t();
-    if !(in_camera.z > 0.0) {
+    if in_camera.z <= 0.0 || in_camera.z.is_nan() {
         return None;
     }
     let k = camera.k();

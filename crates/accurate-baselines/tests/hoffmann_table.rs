@@ -1,3 +1,4 @@
+//! Hoffmann as comparison tables run it.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 mod support;
 use accurate_baselines::HoffmannTable;

@@ -272,6 +272,7 @@ pub(crate) fn pose<'a>(
         projectors,
         steps: (knot_spacing_px / 1.5).ceil().clamp(2.0, 64.0) as usize,
         px_per_unit,
+        floor: std::env::var("FLOOR").ok().and_then(|v| v.parse().ok()).unwrap_or(1e9),
     };
     Ok((problem, spline))
 }

@@ -43,6 +43,7 @@ pub(crate) struct Row {
     /// Derivatives with respect to the shift and the roll of view 2.
     pub(crate) nuisance: [f64; 3],
     pub(crate) distance: f64,
+    pub(crate) precision: f64,
     /// Curve samples outside the mask have a fixed weight and no half thickness.
     pub(crate) outside: bool,
     /// Index of the outline point.
@@ -70,6 +71,7 @@ pub(crate) struct OutlineProblem<'a> {
     /// Chords per span: about 1.5 px each.
     pub(crate) steps: usize,
     pub(crate) px_per_unit: f64,
+    pub(crate) floor: f64,
 }
 
 /// Distances beyond which a curve sample outside the mask is left alone, and within which it is
@@ -161,6 +163,8 @@ impl OutlineProblem<'_> {
             e.rows.push(row(spline, view, projector, u, &p, &jacobian, out / distance, distance));
             if let Some(row) = e.rows.last_mut() {
                 row.point = i;
+                let share = outward / distance;
+                row.precision = (1.0 / 18.0 + self.floor) / (share * share / 12.0 + self.floor);
             }
         }
         left_out
@@ -220,7 +224,8 @@ impl OutlineProblem<'_> {
             sum += if row.outside {
                 self.outside_weight(e, row.view, settings) * row.distance * row.distance
             } else {
-                factor * robust(row.distance - e.state.half_px[row.view])
+                factor
+                    * robust((row.distance - e.state.half_px[row.view]) * row.precision.sqrt())
             };
         }
         let left_out = (e.left_out[0] + e.left_out[1]) as f64;
@@ -254,7 +259,7 @@ impl OutlineProblem<'_> {
             } else {
                 global[row.view] = -1.0;
                 let r = row.distance - e.state.half_px[row.view];
-                (r, factor / (1.0 + r * r / squared_scale))
+                (r, factor * row.precision / (1.0 + r * r * row.precision / squared_scale))
             };
             normal.add_with_globals(
                 row.span,
@@ -295,6 +300,7 @@ fn row(
         gradient: [g.x, g.y, g.z],
         nuisance,
         distance,
+        precision: 1.0,
         outside: false,
         point: usize::MAX,
     }

@@ -287,6 +287,18 @@ fn a_point_on_the_line_stays_even_if_it_is_not_the_anchor() {
 }
 
 #[test]
+fn of_equally_distant_cells_the_first_is_the_anchor() {
+    let curve1 = [Pixel::new(500.0, 539.0), Pixel::new(500.0, 540.0), Pixel::new(500.0, 541.0)];
+    let curve2 = [Pixel::new(450.0, 480.0), Pixel::new(450.0, 480.0)];
+    let rig = turntable();
+    let costs = CostModel::new(rig.fundamental(), &curve1, &curve2, DistanceKind::View1).unwrap();
+    let path = [(1, 0), (1, 1)];
+    let pairs = refine(&path, &costs, RefineRule::Paper, RefineDirections::Horizontal);
+    assert_eq!(pairs[0].pixel1, curve1[1]);
+    assert!(pairs[1].pixel1 != curve1[1]);
+}
+
+#[test]
 fn the_first_and_last_point_have_no_neighbour_to_move_to() {
     let rig = turntable();
     let curve1 = [Pixel::new(500.0, 540.0)];

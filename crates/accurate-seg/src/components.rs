@@ -20,7 +20,10 @@ impl Components {
     /// # Cost
     /// Near linear in the pixels (union-find of imageproc).
     pub fn of(mask: &Mask) -> Result<Self, SegError> {
-        let image = to_image(mask, |pixel| pixel)?;
+        // A row of background more: without it imageproc 0.27 panics on the mask of one pixel.
+        let margin = std::iter::repeat_n(0, mask.width());
+        let bytes = mask.raster().iter().map(|&pixel| u8::from(pixel)).chain(margin);
+        let image = to_image(mask.height() + 1, mask.width(), bytes)?;
         let raw = connected_components(&image, Connectivity::Eight, image::Luma([0]));
         let mut labels = Array2::zeros(mask.shape());
         let mut sizes = Vec::new();
@@ -78,20 +81,18 @@ fn select(mask: &Mask, components: &Components, keep: impl Fn(u32) -> bool) -> M
     mask.clone().retain(|index| keep(labels[index]))
 }
 
-/// The mask as an image of imageproc: 255 where `foreground(pixel)` holds, else 0.
+/// Bytes in raster order as an image of imageproc, which counts pixels in u32.
 pub(crate) fn to_image(
-    mask: &Mask,
-    foreground: impl Fn(bool) -> bool,
+    height: usize,
+    width: usize,
+    bytes: impl Iterator<Item = u8>,
 ) -> Result<GrayImage, SegError> {
-    let (height, width) = mask.shape();
     let too_large = || SegError::TooLarge { height, width };
-    if u32::try_from(mask.raster().len()).is_err() {
+    if height.checked_mul(width).and_then(|pixels| u32::try_from(pixels).ok()).is_none() {
         return Err(too_large());
     }
-    // Each side is at most the product, so it fits as well.
-    let (columns, rows) = (width as u32, height as u32);
-    let bytes = mask.raster().iter().map(|&pixel| if foreground(pixel) { 255 } else { 0 });
-    GrayImage::from_raw(columns, rows, bytes.collect()).ok_or_else(too_large)
+    // Each side is at most the product, so both fit.
+    GrayImage::from_raw(width as u32, height as u32, bytes.collect()).ok_or_else(too_large)
 }
 
 #[cfg(test)]
@@ -117,6 +118,12 @@ mod tests {
     fn the_first_of_two_equal_components_is_the_largest() {
         let kept = keep_largest(&mask(&["#.##", "#...", "...#"])).unwrap();
         assert_eq!(kept, mask(&["#...", "#...", "...."]));
+    }
+
+    #[test]
+    fn a_mask_of_a_single_pixel_is_one_component() {
+        assert_eq!(Components::of(&mask(&["#"])).unwrap().sizes(), [1]);
+        assert_eq!(keep_largest(&mask(&["#"])).unwrap(), mask(&["#"]));
     }
 
     #[test]

@@ -25,7 +25,9 @@ pub fn distance_to_background(mask: &Mask) -> Result<Array2<f64>, SegError> {
     if mask.count() == height * width {
         return Err(SegError::NoBackground { height, width });
     }
-    let squared = euclidean_squared_distance_transform(&to_image(mask, |pixel| !pixel)?);
+    // imageproc measures the distance to the non-zero pixels.
+    let background = mask.raster().iter().map(|&pixel| u8::from(!pixel));
+    let squared = euclidean_squared_distance_transform(&to_image(height, width, background)?);
     let distances = squared.into_raw().into_iter().map(f64::sqrt).collect();
     // imageproc's buffer is row by row, as ours; the sizes agree by construction.
     Array2::from_shape_vec((height, width), distances)

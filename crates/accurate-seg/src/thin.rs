@@ -88,7 +88,7 @@ fn thin(mask: &Mask, rules: &[Rule; 2]) -> Mask {
         }
         for at in doomed.drain(..) {
             for from in [at - stride - 1, at - 1, at + stride - 1] {
-                for near in from..from + 3 {
+                for near in [from, from + 1, from + 2] {
                     if cells[near] & FOREGROUND == 0 {
                         continue;
                     }

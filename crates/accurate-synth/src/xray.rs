@@ -35,7 +35,7 @@ pub struct XrayOptions {
 pub enum XrayResponse {
     /// Proportional to the photon count; 50,000 for an open pixel.
     Linear,
-    /// Proportional to the logarithm of the count: 50,000 for an open pixel, 0 at 1 % of it.
+    /// Proportional to the logarithm of the count: 50,000 for an open pixel, 0 at 3 % of it.
     #[default]
     Log,
 }
@@ -43,7 +43,7 @@ pub enum XrayResponse {
 impl Default for XrayOptions {
     fn default() -> Self {
         Self {
-            dose_photons_per_px: 900.0,
+            dose_photons_per_px: 400.0,
             contrast: 0.45,
             blur_sigma_px: 0.8,
             background: 1.0,
@@ -55,6 +55,8 @@ impl Default for XrayOptions {
 
 /// Value of an open pixel.
 const OPEN: f64 = 50_000.0;
+/// Part of the photons at which the logarithmic response is 0.
+const DARKEST: f64 = 0.03;
 
 impl XrayOptions {
     /// Refuses values outside the documented ranges.
@@ -289,7 +291,7 @@ fn detect(intensity: &Array2<f64>, options: &XrayOptions, rng: &mut ChaCha8Rng) 
         let counted = photons + readout.map_or(0.0, |normal| normal.sample(rng));
         let value = match options.response {
             XrayResponse::Linear => counted / dose,
-            XrayResponse::Log => 1.0 + (counted / dose).max(1e-9).ln() / 100_f64.ln(),
+            XrayResponse::Log => 1.0 + (counted / dose).max(1e-9).ln() / -DARKEST.ln(),
         };
         // The cast saturates at both ends.
         (value * OPEN).round() as u16

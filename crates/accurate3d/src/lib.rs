@@ -1,1 +1,38 @@
-//! Placeholder.
+//! 3D reconstruction of thin flexible bodies (guidewires, catheters, continuum robots) from two
+//! calibrated views.
+//!
+//! [`reconstruct`] takes a [`ViewPair`] (a rig with ordered points, masks or images of both views)
+//! and returns a [`Reconstruction`]: the 3D curve with the pixels it came from and diagnostics.
+//! The stages meet only here; each is a crate of its own and is re-exported as a module:
+//! [`geom`], [`seg`], [`traverse`], [`matching`], [`baselines`], [`eval`], [`synth`], [`io`].
+//!
+//! Research software: not for clinical use.
+
+pub use accurate_baselines as baselines;
+pub use accurate_eval as eval;
+pub use accurate_geom as geom;
+pub use accurate_io as io;
+pub use accurate_match as matching;
+pub use accurate_seg as seg;
+pub use accurate_synth as synth;
+pub use accurate_traverse as traverse;
+
+mod diagnostics;
+mod error;
+mod method;
+mod pair;
+mod picture;
+mod reconstruct;
+mod reconstruction;
+pub mod table;
+
+pub use diagnostics::Diagnostics;
+pub use error::{Error, Stage};
+pub use method::{InputKind, Method, UnknownName};
+pub use pair::ViewPair;
+pub use picture::picture_svg;
+pub use reconstruct::{Params, reconstruct};
+pub use reconstruction::{Reconstruction, Traces};
+
+/// The statement that stands in every report: this is research software.
+pub const NOT_FOR_CLINICAL_USE: &str = "Research software: not for clinical use.";

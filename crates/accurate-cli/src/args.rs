@@ -1,0 +1,240 @@
+use std::path::PathBuf;
+
+use accurate3d::synth::Family;
+use accurate3d::table::{Format, ScoreKind};
+use accurate3d::{InputKind, Method};
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+
+const VERSION: &str =
+    concat!(env!("CARGO_PKG_VERSION"), "\nResearch software: not for clinical use.");
+
+/// 3D reconstruction of thin flexible bodies (guidewires, catheters, continuum robots) from two
+/// calibrated views.
+///
+/// Research software: not for clinical use.
+#[derive(Debug, Parser)]
+#[command(name = "accurate", version = VERSION, arg_required_else_help = true, after_help = EXAMPLES)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+
+    /// Say less: errors only.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+
+    /// Say more; repeat for more still.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    pub verbose: u8,
+
+    /// Print machine-readable JSON instead of prose on stdout.
+    #[arg(long, global = true)]
+    pub json: bool,
+
+    /// Worker threads; 0 takes all cores. The results are the same for any number.
+    #[arg(long, global = true, default_value_t = 0, value_name = "N")]
+    pub threads: usize,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  accurate demo                                        a shipped pair, reconstructed and scored
+  accurate reconstruct case_017 --input mask -o out    one pair folder
+  accurate eval out/curve.csv --truth case_017/annotations/guidewire_3D.ply
+  accurate table                                       the paper's table, beside its figures
+
+Exit codes: 0 done; 1 internal error; 2 wrong usage; 3 no reconstruction found; 65 bad input;
+66 input missing; 69 a needed part is not installed; 74 a file could not be read or written.";
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Reconstruct the 3D curve of one or more pair folders.
+    Reconstruct(ReconstructArgs),
+    /// Generate pair folders with exact truth from a seeded family.
+    Synth(SynthArgs),
+    /// Score a curve file against its truth.
+    Eval(EvalArgs),
+    /// Make the paper's comparison table, its published figures beside ours.
+    Table(TableArgs),
+    /// Order the pixels of one mask along its curve.
+    Trace(TraceArgs),
+    /// Reconstruct and score a shipped pair, with a picture.
+    Demo(DemoArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct ReconstructArgs {
+    /// Pair folders, or folders that hold case_* pair folders.
+    #[arg(required = true, value_name = "PAIR")]
+    pub pairs: Vec<PathBuf>,
+    /// What of the pair to read: points, mask or image.
+    #[arg(short, long)]
+    pub input: InputKind,
+    /// accurate, paper, paper-refined, baert, baert-table, hoffmann, hoffmann-table or baur.
+    #[arg(short, long, default_value_t)]
+    pub method: Method,
+    /// Folder for curve.csv and result.json; with several pairs, one folder a case below it.
+    #[arg(short, long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Curve files to write besides curve.csv.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "FORMATS")]
+    pub also: Vec<CurveFormat>,
+    /// Also write picture.svg.
+    #[arg(long)]
+    pub picture: bool,
+}
+
+/// A curve file format.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum CurveFormat {
+    Ply,
+    Vtp,
+    Npy,
+}
+
+impl CurveFormat {
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::Ply => "ply",
+            Self::Vtp => "vtp",
+            Self::Npy => "npy",
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = families_help())]
+pub struct SynthArgs {
+    /// The family of curves.
+    pub family: Family,
+    /// How many cases.
+    #[arg(short = 'n', long, default_value_t = 10)]
+    pub count: u64,
+    /// Seed of the family's named random streams.
+    #[arg(short, long, default_value_t = 0)]
+    pub seed: u64,
+    /// Folder for case_000, case_001, ...
+    #[arg(short, long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Which ordered points to write.
+    #[arg(long, value_enum, default_value_t = PointsKind::Rounded)]
+    pub points: PointsKind,
+    /// Also render X-ray-like images.
+    #[arg(long)]
+    pub xray: bool,
+    #[command(flatten)]
+    pub disturbances: Disturbances,
+}
+
+/// The two kinds of ordered points a generated case has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PointsKind {
+    /// The paper's protocol: visible truth points, rounded to whole pixels.
+    Rounded,
+    /// Exact sub-pixel projections, about one a pixel.
+    Exact,
+}
+
+#[derive(Debug, Args)]
+pub struct Disturbances {
+    /// Thickness of the wire in the masks, px (default: the family's own).
+    #[arg(long, value_name = "PX")]
+    pub mask_thickness_px: Option<f64>,
+    /// Occlusion discs per view, e.g. 1-2.
+    #[arg(long, value_name = "MIN-MAX", value_parser = parse_range)]
+    pub occlusions: Option<(u32, u32)>,
+    /// Radius of the occlusion discs, px.
+    #[arg(long, value_name = "PX", default_value_t = 8.0)]
+    pub occlusion_radius_px: f64,
+    /// Rotation of camera 2 about its centre that the calibration does not know, degrees.
+    #[arg(long, value_name = "DEG", default_value_t = 0.0)]
+    pub calibration_rotation_deg: f64,
+    /// Shift of camera 2's principal point that the calibration does not know, px.
+    #[arg(long, value_name = "PX", default_value_t = 0.0)]
+    pub calibration_shift_px: f64,
+}
+
+fn parse_range(text: &str) -> Result<(u32, u32), String> {
+    let (low, high) = text.split_once('-').unwrap_or((text, text));
+    match (low.trim().parse(), high.trim().parse()) {
+        (Ok(low), Ok(high)) if low <= high => Ok((low, high)),
+        _ => Err("expected MIN-MAX with MIN <= MAX, e.g. 1-2".to_owned()),
+    }
+}
+
+fn families_help() -> String {
+    let mut help = String::from("Families:\n");
+    for family in Family::ALL {
+        help.push_str(&format!("  {:<10} {}\n", family.to_string(), family.describe()));
+    }
+    help
+}
+
+#[derive(Debug, Args)]
+pub struct EvalArgs {
+    /// The curve: csv, ply, vtp or npy.
+    pub curve: PathBuf,
+    /// The truth: csv, ply, vtp or npy, points in order.
+    #[arg(long, value_name = "FILE")]
+    pub truth: PathBuf,
+    /// Arc length between the samples of the point-to-polyline scores, in the curve's unit
+    /// (default: a 4000th of the truth's length).
+    #[arg(long, value_name = "LENGTH")]
+    pub spacing: Option<f64>,
+    /// Pair folder whose cameras give reprojection errors in px.
+    #[arg(long, value_name = "DIR")]
+    pub pair: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct TableArgs {
+    /// A family (sim-paper, carm, easy, ...), or a folder of pair folders with truth.
+    #[arg(long, default_value = "sim-paper")]
+    pub set: String,
+    /// Only these methods (default: all of the table).
+    #[arg(long, value_delimiter = ',')]
+    pub method: Vec<Method>,
+    /// Only these inputs (default: all of the table).
+    #[arg(long, value_delimiter = ',')]
+    pub input: Vec<InputKind>,
+    /// Seeds of a generated set.
+    #[arg(long, value_delimiter = ',', default_value = "1,2,3,4,5")]
+    pub seeds: Vec<u64>,
+    /// Cases per seed; the paper's simulation test split has 26.
+    #[arg(long, default_value_t = 26)]
+    pub cases: u64,
+    /// Ordered points of a generated set.
+    #[arg(long, value_enum, default_value_t = PointsKind::Rounded)]
+    pub points: PointsKind,
+    /// Which scores: `table` as in the paper (points to points), or `polyline` (points to curve,
+    /// both ways).
+    #[arg(long, default_value_t)]
+    pub scores: ScoreKind,
+    /// md, csv, tex or json (default: a table for the terminal).
+    #[arg(long)]
+    pub format: Option<Format>,
+    /// Write the table here instead of to stdout.
+    #[arg(short, long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Instead of a table: measure every cell of this file and compare it with its accepted
+    /// interval.
+    #[arg(long, value_name = "CELLS.csv", exclusive = true)]
+    pub check: Option<PathBuf>,
+    #[command(flatten)]
+    pub disturbances: Disturbances,
+}
+
+#[derive(Debug, Args)]
+pub struct TraceArgs {
+    /// The mask image; any non-zero pixel is foreground.
+    pub mask: PathBuf,
+    /// Write the ordered points `x,y` here instead of to stdout.
+    #[arg(short, long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Folder for the pair, the curve, the scores and the picture.
+    #[arg(short, long, value_name = "DIR", default_value = "out/demo")]
+    pub out: PathBuf,
+}

@@ -1,0 +1,165 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use accurate3d::io::{PairParts, Truth, find_pairs, read_pair, write_curve, write_json};
+use accurate3d::{
+    InputKind, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair, picture_svg, reconstruct,
+};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::eval::table_scores;
+use crate::args::{CurveFormat, ReconstructArgs};
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::text::{make_folder, write_text};
+
+/// `accurate reconstruct`: every pair on its own; one that fails does not stop the others.
+pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
+    let jobs = jobs(args)?;
+    let bar = console.progress(jobs.len(), "reconstructing");
+    let results: Vec<Result<(String, Value), Failure>> = jobs
+        .par_iter()
+        .map(|(dir, out)| {
+            let result = one(dir, out, args);
+            bar.inc(1);
+            result
+        })
+        .collect();
+    bar.finish_and_clear();
+    let total = results.len();
+    let mut first_failure = None;
+    let mut failed = 0;
+    for result in results {
+        match result {
+            Ok((line, value)) => {
+                if console.json { console.json(&value)? } else { console.data(&line)? }
+            }
+            Err(failure) => {
+                failed += 1;
+                if total > 1 {
+                    console.remark(&failure.to_string());
+                }
+                first_failure.get_or_insert(failure);
+            }
+        }
+    }
+    match first_failure {
+        None => Ok(()),
+        Some(failure) if total == 1 => Err(failure),
+        Some(failure) => Err(failure.about(format!("{failed} of {total} pairs failed"))),
+    }
+}
+
+/// Pair folders with the folder each result goes to.
+fn jobs(args: &ReconstructArgs) -> Result<Vec<(PathBuf, PathBuf)>, Failure> {
+    let mut pairs = Vec::new();
+    for path in &args.pairs {
+        pairs.extend(find_pairs(path)?);
+    }
+    if let [only] = pairs.as_slice()
+        && args.pairs.first() == Some(only)
+    {
+        return Ok(vec![(only.clone(), args.out.clone())]);
+    }
+    let mut outs: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+    for pair in &pairs {
+        let name = pair.canonicalize().ok().and_then(|p| p.file_name().map(|n| n.to_owned()));
+        let out = args.out.join(name.unwrap_or_else(|| "case".into()));
+        if let Some(other) = outs.insert(out.clone(), pair.clone()) {
+            return Err(Failure::new(
+                Failure::USAGE,
+                format!(
+                    "{} and {} would both write to {}",
+                    other.display(),
+                    pair.display(),
+                    out.display()
+                ),
+            )
+            .with_hint("run them with different --out folders"));
+        }
+    }
+    Ok(pairs
+        .into_iter()
+        .map(|pair| {
+            let out = outs.iter().find(|(_, p)| **p == pair).map(|(out, _)| out.clone());
+            (pair, out.unwrap_or_else(|| args.out.clone()))
+        })
+        .collect())
+}
+
+fn one(dir: &Path, out: &Path, args: &ReconstructArgs) -> Result<(String, Value), Failure> {
+    let parts = PairParts {
+        points: args.input == InputKind::Points,
+        masks: args.input == InputKind::Mask,
+        images: args.input == InputKind::Image,
+        truth: Truth::IfPresent,
+    };
+    let pair = ViewPair::from(read_pair(dir, parts)?);
+    let reconstruction = reconstruct(&pair, &Params::new(args.input, args.method))?;
+    let result = result_json(dir, &pair, &reconstruction)?;
+    write_outputs(out, &pair, &reconstruction, &result, &args.also, args.picture)?;
+    Ok((summary(&reconstruction), result))
+}
+
+/// Writes the curve, its extra formats, the picture and last `result.json`.
+pub fn write_outputs(
+    out: &Path,
+    pair: &ViewPair,
+    reconstruction: &Reconstruction,
+    result: &Value,
+    also: &[CurveFormat],
+    picture: bool,
+) -> Result<(), Failure> {
+    make_folder(out)?;
+    let table = reconstruction.curve_table();
+    write_curve(&out.join("curve.csv"), &table)?;
+    for format in also {
+        write_curve(&out.join("curve").with_extension(format.extension()), &table)?;
+    }
+    if picture {
+        write_text(&out.join("picture.svg"), &picture_svg(pair, reconstruction))?;
+    }
+    write_json(&out.join("result.json"), result)?;
+    Ok(())
+}
+
+/// What `result.json` says.
+pub fn result_json(
+    dir: &Path,
+    pair: &ViewPair,
+    reconstruction: &Reconstruction,
+) -> Result<Value, Failure> {
+    let scores = match &pair.truth {
+        Some(truth) => table_scores(&reconstruction.positions(), truth)?,
+        None => Value::Null,
+    };
+    Ok(json!({
+        "case": reconstruction.id,
+        "pair": dir.display().to_string(),
+        "method": reconstruction.method.name(),
+        "input": reconstruction.input.name(),
+        "unit": reconstruction.unit.label(),
+        "points": reconstruction.points.len(),
+        "length": reconstruction.length(),
+        "diagnostics": reconstruction.diagnostics,
+        "scores": scores,
+        "version": env!("CARGO_PKG_VERSION"),
+        "note": NOT_FOR_CLINICAL_USE,
+    }))
+}
+
+/// One line for a reader.
+pub fn summary(reconstruction: &Reconstruction) -> String {
+    let d = &reconstruction.diagnostics;
+    format!(
+        "{}: {} points, {:.1} {}, mean epipolar distance {:.2} px, coverage {:.1} % / {:.1} %",
+        reconstruction.id,
+        reconstruction.points.len(),
+        reconstruction.length(),
+        reconstruction.unit,
+        d.mean_epipolar_distance_px,
+        100.0 * d.trace_coverage[0] * d.matched_fraction[0],
+        100.0 * d.trace_coverage[1] * d.matched_fraction[1],
+    )
+}

@@ -1,0 +1,141 @@
+use std::path::Path;
+
+use accurate3d::io::{PairParts, Truth, find_pairs, read_pair};
+use accurate3d::synth::Family;
+use accurate3d::table::{
+    CaseSet, Outcome, PointsProtocol, Row, check_case_count, check_cells, grid, measure,
+    paper_rows, parse_cells, render,
+};
+use accurate3d::{NOT_FOR_CLINICAL_USE, ViewPair};
+use comfy_table::Table as TerminalTable;
+
+use super::synth::case_options;
+use crate::args::{PointsKind, TableArgs};
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::text::{read_text, write_text};
+
+/// `accurate table`: the paper's table on a set, or the check of its cells.
+pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
+    if let Some(cells) = &args.check {
+        return check(cells, console);
+    }
+    let set = case_set(args)?;
+    if set.is_empty() {
+        return Err(Failure::new(Failure::USAGE, "the table has no case")
+            .with_hint("give at least one seed and one case"));
+    }
+    let rows: Vec<Row> = paper_rows().into_iter().filter(|row| wanted(row, args)).collect();
+    if rows.is_empty() {
+        return Err(Failure::new(Failure::USAGE, "no row of the table has these methods and inputs"));
+    }
+    let bar = console.progress(set.len(), "measuring");
+    let table = measure(&set, &rows, args.scores, &|| bar.inc(1))?;
+    bar.finish_and_clear();
+    let format = if console.json { Some(accurate3d::table::Format::Json) } else { args.format };
+    let text = match format {
+        Some(format) => render(&table, format),
+        None => {
+            let (header, rows) = grid(&table);
+            let mut terminal = TerminalTable::new();
+            terminal.load_preset(comfy_table::presets::ASCII_MARKDOWN).set_header(header);
+            terminal.add_rows(rows);
+            format!("{terminal}\n")
+        }
+    };
+    match &args.out {
+        Some(path) => write_text(path, &text)?,
+        None => console.data(text.trim_end())?,
+    }
+    for row in &table.rows {
+        for (case, reason) in row.result.iter().flat_map(|m| &m.failures) {
+            console.detail(&format!("{} ({}), {case}: {reason}", row.row.label, row.row.input));
+        }
+    }
+    console.remark(&format!("{} cases of {}. {NOT_FOR_CLINICAL_USE}", table.cases, table.set));
+    Ok(())
+}
+
+fn wanted(row: &Row, args: &TableArgs) -> bool {
+    let method = match row.outcome {
+        Outcome::Run(method) => args.method.is_empty() || args.method.contains(&method),
+        Outcome::NotAvailable(_) => args.method.is_empty(),
+    };
+    method && (args.input.is_empty() || args.input.contains(&row.input))
+}
+
+fn case_set(args: &TableArgs) -> Result<CaseSet, Failure> {
+    match args.set.parse::<Family>() {
+        Ok(family) => Ok(CaseSet::Generated {
+            family,
+            options: case_options(&args.disturbances),
+            seeds: args.seeds.clone(),
+            cases: args.cases,
+            points: match args.points {
+                PointsKind::Rounded => PointsProtocol::Rounded,
+                PointsKind::Exact => PointsProtocol::Exact,
+            },
+        }),
+        Err(unknown) => {
+            let path = Path::new(&args.set);
+            if !path.exists() {
+                return Err(Failure::new(Failure::USAGE, unknown.to_string())
+                    .with_hint("or give a folder of pair folders with truth"));
+            }
+            // A part that a pair lacks fails that pair's row, which says so; truth it must have.
+            let parts = PairParts {
+                points: path_has(path, "points"),
+                masks: path_has(path, "masks"),
+                images: false,
+                truth: Truth::Required,
+            };
+            let pairs = find_pairs(path)?
+                .iter()
+                .map(|dir| Ok(ViewPair::from(read_pair(dir, parts)?)))
+                .collect::<Result<_, Failure>>()?;
+            Ok(CaseSet::Given { name: args.set.clone(), pairs })
+        }
+    }
+}
+
+fn path_has(set: &Path, part: &str) -> bool {
+    find_pairs(set).is_ok_and(|pairs| pairs.iter().all(|pair| pair.join(part).is_dir()))
+}
+
+/// `accurate table --check`: every cell that can run, against its accepted interval.
+fn check(path: &Path, console: &Console) -> Result<(), Failure> {
+    let cells = parse_cells(&read_text(path)?).map_err(|problem| {
+        Failure::new(Failure::BAD_INPUT, format!("{}: {problem}", path.display()))
+    })?;
+    let bar = console.progress(check_case_count(&cells), "measuring");
+    let checks = check_cells(&cells, &|| bar.inc(1))?;
+    bar.finish_and_clear();
+    if console.json {
+        console.json(&checks)?;
+    } else {
+        for c in &checks {
+            let name = format!("{} {} {}", c.cell.row, c.cell.dataset, c.cell.metric);
+            let line = match (c.measured, c.cell.low, c.cell.high) {
+                (Some(value), Some(low), Some(high)) => format!(
+                    "{} {name}: {value:.4} in [{low}, {high}] (paper {})",
+                    if c.accepted { "ok  " } else { "FAIL" },
+                    c.cell.paper
+                ),
+                (None, Some(_), _) => format!("FAIL {name}: nothing was measured"),
+                _ => format!("n/a  {name}: {} (paper {})", c.cell.command, c.cell.paper),
+            };
+            console.data(&line)?;
+        }
+    }
+    let ran = checks.iter().filter(|c| c.measured.is_some()).count();
+    let failed = checks.iter().filter(|c| !c.accepted).count();
+    console.remark(&format!("{} cells: {ran} measured, {failed} outside", checks.len()));
+    match (ran, failed) {
+        (_, 1..) => Err(Failure::new(
+            Failure::INTERNAL,
+            format!("{failed} cells lie outside their accepted intervals"),
+        )),
+        (0, _) => Err(Failure::new(Failure::BAD_INPUT, "no cell could be measured")),
+        _ => Ok(()),
+    }
+}

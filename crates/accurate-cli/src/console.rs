@@ -1,0 +1,67 @@
+use std::io::Write;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use crate::args::Cli;
+use crate::failure::Failure;
+
+/// What the user wants to see: data on stdout, prose on stderr.
+#[derive(Debug, Clone, Copy)]
+pub struct Console {
+    pub json: bool,
+    quiet: bool,
+    verbose: u8,
+}
+
+impl Console {
+    pub fn of(cli: &Cli) -> Self {
+        Self { json: cli.json, quiet: cli.quiet, verbose: cli.verbose }
+    }
+
+    /// A line of data.
+    pub fn data(&self, line: &str) -> Result<(), Failure> {
+        // A reader such as `head` may close the pipe early; that is its right, not an error.
+        match writeln!(std::io::stdout().lock(), "{line}") {
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                Err(Failure::new(Failure::IO, format!("stdout: {error}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A value as JSON on stdout.
+    pub fn json(&self, value: &impl Serialize) -> Result<(), Failure> {
+        let text = serde_json::to_string(value)
+            .map_err(|error| Failure::new(Failure::INTERNAL, error.to_string()))?;
+        self.data(&text)
+    }
+
+    /// A remark, unless `-q`.
+    pub fn remark(&self, line: &str) {
+        if !self.quiet {
+            eprintln!("{line}");
+        }
+    }
+
+    /// A detail, with `-v`.
+    pub fn detail(&self, line: &str) {
+        if self.verbose > 0 {
+            eprintln!("{line}");
+        }
+    }
+
+    /// A bar with the time left on a terminal; nothing elsewhere.
+    pub fn progress(&self, total: usize, what: &'static str) -> ProgressBar {
+        if self.quiet || total < 2 {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(total as u64).with_message(what);
+        if let Ok(style) = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len}, {eta} left") {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        bar
+    }
+}

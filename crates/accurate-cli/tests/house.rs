@@ -1,0 +1,151 @@
+//! The house rules that a compiler does not hold: who may import whom, and which crates may touch
+//! the outside world.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// For each crate of ours, the crates of ours it may depend on.
+const MAY_IMPORT: &[(&str, &[&str])] = &[
+    ("accurate-geom", &[]),
+    ("accurate-seg", &["accurate-geom"]),
+    ("accurate-traverse", &["accurate-geom"]),
+    ("accurate-match", &["accurate-geom"]),
+    ("accurate-fit", &["accurate-geom"]),
+    ("accurate-baselines", &["accurate-geom", "accurate-match"]),
+    ("accurate-eval", &["accurate-geom"]),
+    ("accurate-synth", &["accurate-geom"]),
+    ("accurate-io", &["accurate-geom"]),
+    (
+        "accurate3d",
+        &[
+            "accurate-geom",
+            "accurate-seg",
+            "accurate-traverse",
+            "accurate-match",
+            "accurate-fit",
+            "accurate-baselines",
+            "accurate-eval",
+            "accurate-synth",
+            "accurate-io",
+        ],
+    ),
+    ("accurate-cli", &["accurate3d"]),
+];
+
+/// Third-party crates that `accurate-geom` may take: the vocabulary stays light.
+const GEOM_TAKES: &[&str] = &["nalgebra", "thiserror", "serde"];
+
+/// Crates that open no file, print nothing and read no clock.
+const PURE: &[&str] = &[
+    "accurate-geom",
+    "accurate-seg",
+    "accurate-traverse",
+    "accurate-match",
+    "accurate-fit",
+    "accurate-baselines",
+    "accurate-eval",
+    "accurate-synth",
+];
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+}
+
+fn dependencies(manifest: &Path) -> BTreeSet<String> {
+    let text = fs::read_to_string(manifest).unwrap();
+    let table: toml::Table = text.parse().unwrap();
+    let names = |key: &str| {
+        table.get(key).and_then(|d| d.as_table()).map(|d| d.keys().cloned().collect::<Vec<_>>())
+    };
+    ["dependencies", "build-dependencies"].iter().filter_map(|key| names(key)).flatten().collect()
+}
+
+fn crates() -> BTreeMap<String, PathBuf> {
+    fs::read_dir(workspace().join("crates"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.join("Cargo.toml").is_file())
+        .map(|path| (path.file_name().unwrap().to_str().unwrap().to_owned(), path))
+        .collect()
+}
+
+#[test]
+fn no_crate_imports_upwards_or_sideways() {
+    let allowed: BTreeMap<_, _> = MAY_IMPORT.iter().copied().collect();
+    let ours = crates();
+    assert!(!ours.is_empty());
+    for (name, path) in &ours {
+        let may = allowed
+            .get(name.as_str())
+            .unwrap_or_else(|| panic!("{name} has no row in MAY_IMPORT: say whom it may import"));
+        for dependency in dependencies(&path.join("Cargo.toml")) {
+            assert!(
+                !ours.contains_key(&dependency) || may.contains(&dependency.as_str()),
+                "{name} must not import {dependency}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_vocabulary_stays_light() {
+    for dependency in dependencies(&workspace().join("crates/accurate-geom/Cargo.toml")) {
+        assert!(GEOM_TAKES.contains(&dependency.as_str()), "accurate-geom takes {dependency}");
+    }
+}
+
+#[test]
+fn folder_and_crate_names_agree() {
+    for (name, path) in crates() {
+        let text = fs::read_to_string(path.join("Cargo.toml")).unwrap();
+        assert!(text.contains(&format!("name = \"{name}\"")), "{name}");
+    }
+}
+
+#[test]
+fn pure_crates_open_no_file_and_read_no_clock() {
+    let forbidden =
+        ["std::fs", "std::net", "std::env", "std::process", "Instant::", "SystemTime", "println!"];
+    let ours = crates();
+    for name in PURE {
+        let Some(path) = ours.get(*name) else { panic!("no crate {name}") };
+        for file in rust_files(&path.join("src")) {
+            let text = fs::read_to_string(&file).unwrap();
+            // Documentation may speak of them; code may not.
+            let code: String =
+                text.lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+            for word in forbidden {
+                assert!(!code.contains(word), "{} uses {word}", file.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn no_source_file_is_a_drawer_for_everything() {
+    for (_, path) in crates() {
+        for file in rust_files(&path.join("src")) {
+            let stem = file.file_stem().unwrap().to_str().unwrap();
+            assert!(
+                !["utils", "util", "common", "helpers", "misc"].contains(&stem),
+                "{}: name the idea",
+                file.display()
+            );
+        }
+    }
+}
+
+fn rust_files(dir: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files.extend(rust_files(&path));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            files.push(path);
+        }
+    }
+    files
+}

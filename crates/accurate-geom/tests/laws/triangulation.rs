@@ -1,0 +1,199 @@
+use accurate_geom::{
+    Camera, GeomError, Pixel, Point2, Point3, Rig, Triangulation, Triangulator,
+    UnknownTriangulation, View1, View2,
+};
+use proptest::prelude::*;
+
+use crate::generators::{Scene, projection_rounding_px, scenes, scenes_with_points};
+
+fn solve(
+    rig: &Rig,
+    method: Triangulation,
+    (p1, p2): (Pixel<View1>, Pixel<View2>),
+) -> Result<Point3, GeomError> {
+    Triangulator::new(rig, method).triangulate(p1, p2)
+}
+
+/// Sum of squared reprojection errors, px².
+fn cost(rig: &Rig, x: &Point3, (p1, p2): (Pixel<View1>, Pixel<View2>)) -> f64 {
+    let (q1, q2) = rig.project(x).unwrap();
+    p1.distance(q1).powi(2) + p2.distance(q2).powi(2)
+}
+
+/// World length of one pixel of error at `x`: depth / f across the ray, stretched by the parallax.
+fn world_per_px(rig: &Rig, x: &Point3) -> f64 {
+    let across = [rig.camera1(), rig.camera2()]
+        .map(|c| c.depth(x) / c.k()[(0, 0)].abs().min(c.k()[(1, 1)].abs()))
+        .into_iter()
+        .fold(0.0, f64::max);
+    let (d1, d2) = (x - rig.camera1().centre(), x - rig.camera2().centre());
+    across / d1.normalize().cross(&d2.normalize()).norm()
+}
+
+/// The images of the other centre, behind the camera or not.
+fn epipoles(rig: &Rig) -> (Pixel<View1>, Pixel<View2>) {
+    let image = |camera: &Camera, c: Point3| {
+        let h = camera.k() * (camera.r() * c.coords + camera.t());
+        Point2::new(h.x / h.z, h.y / h.z)
+    };
+    let (camera1, camera2) = (rig.camera1(), rig.camera2());
+    (image(camera1, camera2.centre()).into(), image(camera2, camera1.centre()).into())
+}
+
+fn noisy(rig: &Rig, x: &Point3, noise: [f64; 4]) -> (Pixel<View1>, Pixel<View2>) {
+    let (p1, p2) = rig.project(x).unwrap();
+    (Pixel::new(p1.x + noise[0], p1.y + noise[1]), Pixel::new(p2.x + noise[2], p2.y + noise[3]))
+}
+
+fn noise(px: f64) -> impl Strategy<Value = [f64; 4]> {
+    [-px..px, -px..px, -px..px, -px..px]
+}
+
+proptest! {
+    #[test]
+    fn projection_then_triangulation_is_the_identity((scene, [x]) in scenes_with_points::<1>()) {
+        let Scene { rig, .. } = &scene;
+        let pixels = rig.project(&x).unwrap();
+        let rounding_px = projection_rounding_px(rig.camera1(), &x)
+            .max(projection_rounding_px(rig.camera2(), &x));
+        // Four coordinates enter; the solver rounds about as much as the projection did.
+        let tolerance = 8.0 * rounding_px * world_per_px(rig, &x);
+        for method in Triangulation::ALL {
+            let found = solve(rig, method, pixels).unwrap();
+            prop_assert!((found - x).norm() <= tolerance,
+                "{method}: off by {:e}, tolerance {tolerance:e}", (found - x).norm());
+        }
+    }
+
+    #[test]
+    fn swapping_the_views_does_not_move_the_point(
+        (scene, [x]) in scenes_with_points::<1>(),
+        noise in noise(3.0),
+    ) {
+        let rig = &scene.rig;
+        let (p1, p2) = noisy(rig, &x, noise);
+        let rounding_px = projection_rounding_px(rig.camera1(), &x)
+            .max(projection_rounding_px(rig.camera2(), &x));
+        for method in Triangulation::ALL {
+            let straight = solve(rig, method, (p1, p2)).unwrap();
+            let swapped = solve(
+                &rig.swapped(), method, (Pixel::new(p2.x, p2.y), Pixel::new(p1.x, p1.y)),
+            ).unwrap();
+            // A minimum of the cost is only known to the root of its rounding.
+            let px = if method == Triangulation::GaussNewton { 1e-6 } else { 16.0 * rounding_px };
+            prop_assert!((straight - swapped).norm() <= px * world_per_px(rig, &x),
+                "{method}: {:e} apart", (straight - swapped).norm());
+        }
+    }
+
+    #[test]
+    fn lindstrom_and_gauss_newton_agree_and_never_reproject_worse_than_dlt(
+        (scene, [x]) in scenes_with_points::<1>(),
+        noise in noise(3.0),
+    ) {
+        let rig = &scene.rig;
+        let pixels = noisy(rig, &x, noise);
+        let dlt = cost(rig, &solve(rig, Triangulation::Dlt, pixels).unwrap(), pixels);
+        let gn = solve(rig, Triangulation::GaussNewton, pixels).unwrap();
+        let lindstrom = solve(rig, Triangulation::LindstromNiter2, pixels).unwrap();
+        let (gn_cost, lindstrom_cost) = (cost(rig, &gn, pixels), cost(rig, &lindstrom, pixels));
+        let rounding_px = projection_rounding_px(rig.camera1(), &x)
+            .max(projection_rounding_px(rig.camera2(), &x));
+        // Cost r² with r known to the rounding of a projection.
+        let slack = 16.0 * rounding_px * (dlt.sqrt() + rounding_px);
+        prop_assert!(gn_cost <= dlt + slack);
+        // The first step follows normals that are off by r / L, where L is how far a pixel moves
+        // until its partner's epipolar line has turned: the epipolar plane ends up r² / L away
+        // from the best one, and the cost, which is flat there, (r² / L)² above the least.
+        let f = rig.fundamental().matrix();
+        let n1 = (f * pixels.1.homogeneous()).xy().norm();
+        let n2 = (f.transpose() * pixels.0.homogeneous()).xy().norm();
+        let length_px = n1.min(n2) / f.fixed_view::<2, 2>(0, 0).norm();
+        let off_px = gn_cost / length_px;
+        let slack = slack + off_px.powi(2);
+        prop_assert!(lindstrom_cost <= dlt + slack, "{lindstrom_cost} > {dlt}");
+        prop_assert!((lindstrom_cost - gn_cost).abs() <= slack, "{lindstrom_cost} {gn_cost}");
+        // A minimum is only known to the root of the cost's rounding, hence the 1e-6 px.
+        prop_assert!((gn - lindstrom).norm() <= (off_px + 1e-6) * world_per_px(rig, &x));
+    }
+
+    #[test]
+    fn triangulation_is_finite_or_a_typed_error(
+        scene in scenes(),
+        p in [-1e4..1e4f64, -1e4..1e4f64, -1e4..1e4f64, -1e4..1e4f64],
+        exponent in 0..300i32,
+    ) {
+        let grow = 10f64.powi(exponent);
+        for scale in [1.0, grow] {
+            let pixels = (Pixel::new(p[0] * scale, p[1]), Pixel::new(p[2], p[3] * scale));
+            for method in Triangulation::ALL {
+                if let Ok(x) = solve(&scene.rig, method, pixels) {
+                    prop_assert!(x.iter().all(|v| v.is_finite()));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_at_the_epipoles_are_refused((scene, [x]) in scenes_with_points::<1>()) {
+        let rig = &scene.rig;
+        let (c1, c2) = (rig.camera1().centre(), rig.camera2().centre());
+        let both = epipoles(rig);
+        // Epipoles near infinity (baseline across an axis) have no digits left.
+        prop_assume!(both.0.point().coords.norm().max(both.1.point().coords.norm()) < 1e5);
+        let (_, p2) = rig.project(&x).unwrap();
+        for method in Triangulation::ALL {
+            let parallel =
+                matches!(solve(rig, method, both), Err(GeomError::ParallelRays { .. }));
+            prop_assert!(parallel, "{method}");
+            // Reprojection is undefined at the centre and flat beside it: Gauss-Newton may roam.
+            if method == Triangulation::GaussNewton {
+                continue;
+            }
+            if let Ok(found) = solve(rig, method, (both.0, p2)) {
+                // Not told from the centre only by rounding of the epipole itself.
+                prop_assert!((found - c2).norm() < 1e-6 * (c2 - c1).norm(), "{method}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pixel_that_is_not_finite_is_named() {
+    let scene = fixed_scene();
+    for method in Triangulation::ALL {
+        let error =
+            solve(&scene, method, (Pixel::new(1.0, f64::NAN), Pixel::new(1.0, 2.0))).unwrap_err();
+        assert!(matches!(error, GeomError::NotFinite { ref what, .. } if what == "y1"));
+    }
+}
+
+#[test]
+fn names_of_methods_round_trip() {
+    for method in Triangulation::ALL {
+        assert_eq!(method.to_string().parse(), Ok(method));
+    }
+    assert_eq!("best".parse::<Triangulation>(), Err(UnknownTriangulation("best".into())));
+}
+
+/// Two parallel cameras: the simplest rig with rays that do not meet.
+fn fixed_scene() -> Rig {
+    use accurate_geom::nalgebra::{Matrix3, Vector3};
+    use accurate_geom::{Camera, ImageSize, LengthUnit};
+    let k = Matrix3::new(1000.0, 0.0, 256.0, 0.0, -1000.0, 256.0, 0.0, 0.0, 1.0);
+    let size = ImageSize { width: 512, height: 512 };
+    let camera1 = Camera::new(k, Matrix3::identity(), Vector3::zeros(), size).unwrap();
+    let camera2 =
+        Camera::new(k, Matrix3::identity(), Vector3::new(-100.0, 0.0, 0.0), size).unwrap();
+    Rig::new(camera1, camera2, LengthUnit::Millimetre).unwrap()
+}
+
+#[test]
+fn parallel_rays_are_refused_by_every_method() {
+    for method in Triangulation::ALL {
+        let error =
+            solve(&fixed_scene(), method, (Pixel::new(300.0, 200.0), Pixel::new(300.0, 200.0)))
+                .unwrap_err();
+        assert!(matches!(error, GeomError::ParallelRays { .. }), "{method}: {error}");
+    }
+}

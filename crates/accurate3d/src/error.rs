@@ -1,0 +1,94 @@
+use std::fmt;
+
+use accurate_match::MatchError;
+use accurate_seg::SegError;
+use accurate_synth::SynthError;
+use accurate_traverse::TraverseError;
+use thiserror::Error;
+
+use crate::{InputKind, UnknownName};
+
+/// The stage of the pipeline that refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Image to mask to skeleton.
+    Segmentation,
+    /// Skeleton to ordered curve.
+    Traversal,
+    /// Ordered curves to 3D.
+    Matching,
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Segmentation => "segmentation",
+            Self::Traversal => "traversal",
+            Self::Matching => "matching",
+        })
+    }
+}
+
+/// Why a pair could not be reconstructed.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The pair lacks what the chosen input needs.
+    #[error("case {case}: no {input} in this pair")]
+    MissingInput {
+        /// Case id.
+        case: String,
+        /// What was asked for.
+        input: InputKind,
+    },
+    /// Images need a segmentation network, and none is installed.
+    #[error("case {case}: no segmentation network is installed, so images cannot be read yet")]
+    NoNetwork {
+        /// Case id.
+        case: String,
+    },
+    /// The mask of a view could not be skeletonised.
+    #[error("case {case}, view {view}: {source}")]
+    Segmentation {
+        /// Case id.
+        case: String,
+        /// 1 or 2.
+        view: u8,
+        /// What segmentation says.
+        source: SegError,
+    },
+    /// The skeletons could not be ordered.
+    #[error("case {case}: {source}")]
+    Traversal {
+        /// Case id.
+        case: String,
+        /// What traversal says.
+        source: TraverseError,
+    },
+    /// The curves could not be matched.
+    #[error("case {case}: {source}")]
+    Matching {
+        /// Case id.
+        case: String,
+        /// What matching says.
+        source: MatchError,
+    },
+    /// A name stands for nothing.
+    #[error(transparent)]
+    Name(#[from] UnknownName),
+    /// A case could not be generated.
+    #[error(transparent)]
+    Synthesis(#[from] SynthError),
+}
+
+impl Error {
+    /// The stage that refused, where it was a stage.
+    pub fn stage(&self) -> Option<Stage> {
+        match self {
+            Self::Segmentation { .. } | Self::NoNetwork { .. } => Some(Stage::Segmentation),
+            Self::Traversal { .. } => Some(Stage::Traversal),
+            Self::Matching { .. } => Some(Stage::Matching),
+            Self::MissingInput { .. } | Self::Name(_) | Self::Synthesis(_) => None,
+        }
+    }
+}

@@ -1,0 +1,77 @@
+use accurate_geom::{Pixel, View, View1, View2};
+use accurate_seg::{Mask, Skeleton, zhang_suen};
+use accurate_traverse::{TraverseParams, trace_pair};
+use ndarray::Array2;
+
+use crate::{Diagnostics, Error, InputKind, Method, Reconstruction, Traces, ViewPair};
+
+/// What to do with a pair.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Params {
+    /// Which part of the pair is read.
+    pub input: InputKind,
+    /// How it is reconstructed.
+    pub method: Method,
+    /// Parameters of the published traversal (masks only).
+    pub traverse: TraverseParams,
+}
+
+impl Params {
+    /// The published parameters for an input and a method.
+    pub const fn new(input: InputKind, method: Method) -> Self {
+        Self { input, method, traverse: TraverseParams::PAPER }
+    }
+}
+
+/// Reconstructs the 3D curve seen in both views of a pair.
+///
+/// Masks are skeletonised (Zhang-Suen), ordered by GCTT, and matched; points are matched as they
+/// are.
+///
+/// # Errors
+/// [`Error`], which names the case and the stage; never an empty curve, never a NaN.
+pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
+    let case = || pair.id.clone();
+    let missing = || Error::MissingInput { case: case(), input: params.input };
+    let traces = match params.input {
+        InputKind::Points => {
+            let (points1, points2) = pair.points.as_ref().ok_or_else(missing)?;
+            Traces::given(points1.clone(), points2.clone())
+        }
+        InputKind::Mask => {
+            let [mask1, mask2] = pair.masks.as_ref().ok_or_else(missing)?;
+            let skeleton1 = skeleton_pixels::<View1>(mask1, &pair.id)?;
+            let skeleton2 = skeleton_pixels::<View2>(mask2, &pair.id)?;
+            let f = pair.rig.fundamental();
+            let (trace1, trace2) = trace_pair(&skeleton1, &skeleton2, f, &params.traverse)
+                .map_err(|source| Error::Traversal { case: case(), source })?;
+            Traces::traced(trace1, trace2)
+        }
+        InputKind::Image => {
+            pair.images.as_ref().ok_or_else(missing)?;
+            return Err(Error::NoNetwork { case: case() });
+        }
+    };
+    let matched = params
+        .method
+        .matcher()
+        .reconstruct(&traces.points1, &traces.points2, &pair.rig)
+        .map_err(|source| Error::Matching { case: case(), source })?;
+    let diagnostics = Diagnostics::of(&matched, &traces);
+    Ok(Reconstruction {
+        id: case(),
+        method: params.method,
+        input: params.input,
+        unit: pair.rig.unit(),
+        points: matched.points,
+        traces,
+        diagnostics,
+    })
+}
+
+fn skeleton_pixels<V: View>(mask: &Array2<bool>, case: &str) -> Result<Vec<Pixel<V>>, Error> {
+    let refuse = |source| Error::Segmentation { case: case.to_owned(), view: V::NUMBER, source };
+    let mask = Mask::from_array(mask.clone()).map_err(refuse)?;
+    let skeleton = Skeleton::of(&zhang_suen(&mask)).map_err(refuse)?;
+    Ok(skeleton.pixels_as::<V>())
+}

@@ -1,0 +1,101 @@
+use accurate_geom::{LengthUnit, Pixel, Point3, View1, View2};
+use accurate_io::{Column, CurveTable};
+use accurate_match::CurvePoint;
+use accurate_traverse::Trace;
+
+use crate::{Diagnostics, InputKind, Method};
+
+/// A reconstructed 3D curve: at least one point, all finite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reconstruction {
+    /// Name of the case.
+    pub id: String,
+    /// The method that made it.
+    pub method: Method,
+    /// What it was made from.
+    pub input: InputKind,
+    /// Unit of the positions.
+    pub unit: LengthUnit,
+    /// Points in order along the body, with the pixels they came from.
+    pub points: Vec<CurvePoint>,
+    /// The ordered curves that were matched.
+    pub traces: Traces,
+    /// How far the result can be trusted.
+    pub diagnostics: Diagnostics,
+}
+
+impl Reconstruction {
+    /// The positions alone, in order.
+    pub fn positions(&self) -> Vec<Point3> {
+        self.points.iter().map(|p| p.position).collect()
+    }
+
+    /// Length of the polyline through the points, in [`Reconstruction::unit`].
+    pub fn length(&self) -> f64 {
+        self.points.windows(2).map(|w| (w[1].position - w[0].position).norm()).sum()
+    }
+
+    /// The curve with its per-point columns, ready for any curve file.
+    pub fn curve_table(&self) -> CurveTable {
+        let mut travelled = 0.0;
+        let mut arc_length = Vec::with_capacity(self.points.len());
+        for (i, point) in self.points.iter().enumerate() {
+            if i > 0 {
+                travelled += (point.position - self.points[i - 1].position).norm();
+            }
+            arc_length.push(travelled);
+        }
+        let column = |name: &str, unit: &str, value: fn(&CurvePoint) -> f64| Column {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            values: self.points.iter().map(value).collect(),
+        };
+        let arc_length = Column {
+            name: "arc_length".to_owned(),
+            unit: self.unit.label().to_owned(),
+            values: arc_length,
+        };
+        CurveTable {
+            unit: self.unit,
+            points: self.positions(),
+            columns: vec![
+                arc_length,
+                column("epipolar_distance_px", "px", |p| p.epipolar_distance_px),
+                column("x1_px", "px", |p| p.pixel1.x),
+                column("y1_px", "px", |p| p.pixel1.y),
+                column("x2_px", "px", |p| p.pixel2.x),
+                column("y2_px", "px", |p| p.pixel2.y),
+            ],
+        }
+    }
+}
+
+/// The ordered curves of both views, and what of the skeletons they left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Traces {
+    /// Ordered pixels of view 1.
+    pub points1: Vec<Pixel<View1>>,
+    /// Ordered pixels of view 2.
+    pub points2: Vec<Pixel<View2>>,
+    /// Fraction of each view's skeleton that the trace passes, 1 where the points were given.
+    pub coverage: [f64; 2],
+    /// Steps longer than 3 px in each view's trace, 0 where the points were given.
+    pub jumps: [usize; 2],
+}
+
+impl Traces {
+    /// Curves that were given in order.
+    pub(crate) fn given(points1: Vec<Pixel<View1>>, points2: Vec<Pixel<View2>>) -> Self {
+        Self { points1, points2, coverage: [1.0; 2], jumps: [0; 2] }
+    }
+
+    /// Curves that were traced from skeletons.
+    pub(crate) fn traced(trace1: Trace<View1>, trace2: Trace<View2>) -> Self {
+        Self {
+            coverage: [trace1.coverage, trace2.coverage],
+            jumps: [trace1.jumps.len(), trace2.jumps.len()],
+            points1: trace1.points,
+            points2: trace2.points,
+        }
+    }
+}

@@ -1,0 +1,155 @@
+use std::collections::BTreeSet;
+
+use accurate_synth::{CaseOptions, Family};
+use serde::{Deserialize, Serialize};
+
+use super::measure::{CaseSet, PointsProtocol, measure};
+use super::rows::{Outcome, Row, paper_rows};
+use super::{ScoreKind, Table};
+use crate::{Error, Method, UnknownName};
+
+/// Seeds and cases per seed behind every cell: 5 draws of as many cases as the paper's simulation
+/// test split has.
+const SEEDS: [u64; 5] = [1, 2, 3, 4, 5];
+const CASES: u64 = 26;
+
+/// One published number, the command that makes ours, and the interval ours must lie in.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Cell {
+    /// Row id of the published table.
+    pub row: String,
+    /// `simulation` or `phantom`.
+    pub dataset: String,
+    /// Column: `Acc`, `Comp`, `Overall` or `Max Err`.
+    pub metric: String,
+    /// The paper's value.
+    pub paper: f64,
+    /// Family that stands for the paper's data set.
+    pub set: String,
+    /// Our method, or empty where the row cannot run.
+    pub method: String,
+    /// Lower end of the accepted interval, empty where the row cannot run.
+    pub low: Option<f64>,
+    /// Upper end of the accepted interval.
+    pub high: Option<f64>,
+    /// How to make the number again, or why it cannot be made.
+    pub command: String,
+}
+
+/// A cell beside what was measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CellCheck {
+    /// The cell.
+    pub cell: Cell,
+    /// Our value; `None` where the row cannot run.
+    pub measured: Option<f64>,
+    /// Whether it lies in the accepted interval; a row that cannot run is no failure.
+    pub accepted: bool,
+}
+
+/// Reads cells from CSV text with a header.
+///
+/// # Errors
+/// The first line that does not fit, in words.
+pub fn parse_cells(text: &str) -> Result<Vec<Cell>, String> {
+    let cells: Vec<Cell> = csv::Reader::from_reader(text.as_bytes())
+        .deserialize()
+        .collect::<Result<_, _>>()
+        .map_err(|error| error.to_string())?;
+    for cell in &cells {
+        if cell.method.is_empty() != (cell.low.is_none() || cell.high.is_none()) {
+            return Err(format!(
+                "cell {} {} {}: a method needs both ends of an accepted interval, and only a method",
+                cell.row, cell.dataset, cell.metric
+            ));
+        }
+    }
+    Ok(cells)
+}
+
+/// Runs every cell that can run and compares it with its accepted interval.
+///
+/// # Errors
+/// [`Error::Synthesis`], or [`Error::Name`] if a cell names an unknown set or method.
+pub fn check_cells(
+    cells: &[Cell],
+    on_case: &(dyn Fn() + Sync),
+) -> Result<Vec<CellCheck>, Error> {
+    let sets: BTreeSet<&str> =
+        cells.iter().filter(|c| !c.method.is_empty()).map(|c| c.set.as_str()).collect();
+    let mut tables: Vec<(&str, Table)> = Vec::new();
+    for set in sets {
+        let family: Family = set.parse().map_err(|_| UnknownName {
+            what: "set",
+            name: set.to_owned(),
+            expected: Family::ALL.map(|f| f.to_string()).join(", "),
+        })?;
+        let rows: Vec<Row> = paper_rows()
+            .into_iter()
+            .filter(|row| {
+                cells.iter().any(|c| c.set == set && row.published == Some(c.row.as_str()))
+                    && matches!(row.outcome, Outcome::Run(_))
+            })
+            .collect();
+        let cases = CaseSet::Generated {
+            family,
+            options: CaseOptions::default(),
+            seeds: SEEDS.to_vec(),
+            cases: CASES,
+            points: PointsProtocol::Rounded,
+        };
+        tables.push((set, measure(&cases, &rows, ScoreKind::Table, on_case)?));
+    }
+    cells.iter().map(|cell| check(cell, &tables)).collect()
+}
+
+/// Number of cases that [`check_cells`] goes through, for a progress bar.
+pub fn check_case_count(cells: &[Cell]) -> usize {
+    let sets: BTreeSet<&str> =
+        cells.iter().filter(|c| !c.method.is_empty()).map(|c| c.set.as_str()).collect();
+    sets.len() * SEEDS.len() * CASES as usize
+}
+
+fn check(cell: &Cell, tables: &[(&str, Table)]) -> Result<CellCheck, Error> {
+    let (Some(low), Some(high)) = (cell.low, cell.high) else {
+        return Ok(CellCheck { cell: cell.clone(), measured: None, accepted: true });
+    };
+    let method: Method = cell.method.parse()?;
+    let measured = tables
+        .iter()
+        .filter(|(set, _)| *set == cell.set)
+        .flat_map(|(_, table)| &table.rows)
+        .filter(|row| {
+            row.row.published == Some(cell.row.as_str())
+                && row.row.outcome == Outcome::Run(method)
+        })
+        .filter_map(|row| row.result.as_ref().ok())
+        .flat_map(|measured| &measured.columns)
+        .find(|(name, _)| *name == cell.metric)
+        .map(|(_, interval)| interval.mean);
+    // A cell whose row or column does not exist has measured nothing, and that is a failure.
+    let accepted = measured.is_some_and(|value| (low..=high).contains(&value));
+    Ok(CellCheck { cell: cell.clone(), measured, accepted })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "row,dataset,metric,paper,set,method,low,high,command\n";
+
+    #[test]
+    fn a_cell_without_interval_must_be_one_that_cannot_run() {
+        let bad = format!("{HEADER}baert,simulation,Acc,0.88,sim-paper,baert-table,,,x\n");
+        assert!(parse_cells(&bad).unwrap_err().contains("accepted interval"));
+        let good = format!("{HEADER}vggt,simulation,Acc,2.85,sim-paper,,,,no weights\n");
+        assert_eq!(parse_cells(&good).unwrap().len(), 1);
+    }
+
+    #[test]
+    fn a_cell_that_names_no_row_is_not_accepted() {
+        let text = format!("{HEADER}nobody,simulation,Acc,1,sim-paper,paper,0,9,x\n");
+        let cells = parse_cells(&text).unwrap();
+        assert!(!check(&cells[0], &[]).unwrap().accepted);
+    }
+}

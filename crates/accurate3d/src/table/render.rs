@@ -1,0 +1,274 @@
+use std::fmt;
+use std::fmt::Write;
+use std::str::FromStr;
+
+use accurate_eval::{Dataset, published};
+use serde_json::{Value, json};
+
+use super::measure::{Table, TableRow};
+use crate::UnknownName;
+
+/// How a table is written to a file or to stdout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Markdown.
+    Md,
+    /// Comma-separated values.
+    Csv,
+    /// LaTeX with booktabs.
+    Tex,
+    /// JSON.
+    Json,
+}
+
+impl FromStr for Format {
+    type Err = UnknownName;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        match name {
+            "md" => Ok(Self::Md),
+            "csv" => Ok(Self::Csv),
+            "tex" => Ok(Self::Tex),
+            "json" => Ok(Self::Json),
+            _ => Err(UnknownName {
+                what: "format",
+                name: name.to_owned(),
+                expected: "md, csv, tex, json".to_owned(),
+            }),
+        }
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Md => "md",
+            Self::Csv => "csv",
+            Self::Tex => "tex",
+            Self::Json => "json",
+        })
+    }
+}
+
+/// The table as text in the given format, with a final newline.
+pub fn render(table: &Table, format: Format) -> String {
+    match format {
+        Format::Md => markdown(table),
+        Format::Csv => csv(table),
+        Format::Tex => latex(table),
+        Format::Json => format!("{:#}\n", to_json(table)),
+    }
+}
+
+/// Header and cells as text, for any grid: the paper's figure, ours with its interval, failures.
+pub fn grid(table: &Table) -> (Vec<String>, Vec<Vec<String>>) {
+    let columns = column_names(table);
+    let mut header: Vec<String> =
+        ["Method", "Input", "Calib."].iter().map(|s| (*s).to_owned()).collect();
+    let shows_paper = dataset_of(&table.set).is_some() && columns.contains(&"Acc");
+    for column in &columns {
+        if shows_paper {
+            header.push(format!("{column} (paper)"));
+        }
+        header.push((*column).to_owned());
+    }
+    header.push("failed".to_owned());
+    let rows = table
+        .rows
+        .iter()
+        .map(|row| {
+            let mut cells = vec![
+                row.row.label.to_owned(),
+                row.row.input.to_string(),
+                if row.row.calibrated { "yes" } else { "no" }.to_owned(),
+            ];
+            for column in &columns {
+                if shows_paper {
+                    cells.push(
+                        paper_value(table, row, column)
+                            .map_or_else(|| "-".to_owned(), |v| format!("{v:.4}")),
+                    );
+                }
+                cells.push(match &row.result {
+                    Ok(measured) => measured.columns.iter().find(|(n, _)| n == column).map_or_else(
+                        || "-".to_owned(),
+                        |(_, i)| {
+                            if i.low == i.high {
+                                number(i.mean)
+                            } else {
+                                format!("{} [{}, {}]", number(i.mean), number(i.low), number(i.high))
+                            }
+                        },
+                    ),
+                    Err(reason) => format!("n/a ({reason})"),
+                });
+            }
+            cells.push(match &row.result {
+                Ok(m) => format!("{} of {}", m.failures.len(), m.failures.len() + m.scored),
+                Err(_) => "-".to_owned(),
+            });
+            cells
+        })
+        .collect();
+    (header, rows)
+}
+
+/// Four significant digits, never fewer than four decimals below 10.
+fn number(value: f64) -> String {
+    if value.abs() < 10.0 { format!("{value:.4}") } else { format!("{value:.2}") }
+}
+
+/// The published data set that a family stands for.
+fn dataset_of(set: &str) -> Option<Dataset> {
+    match set {
+        "sim-paper" => Some(Dataset::Simulation),
+        "carm" => Some(Dataset::Phantom),
+        _ => None,
+    }
+}
+
+fn paper_value(table: &Table, row: &TableRow, column: &str) -> Option<f64> {
+    published(row.row.published?, dataset_of(&table.set)?, column)
+}
+
+fn column_names(table: &Table) -> Vec<&'static str> {
+    table
+        .rows
+        .iter()
+        .filter_map(|row| row.result.as_ref().ok())
+        .find(|m| !m.columns.is_empty())
+        .map(|m| m.columns.iter().map(|(name, _)| *name).collect())
+        .unwrap_or_default()
+}
+
+/// What stands over the table: the set, the cases, the unit, and how to read it.
+fn caption(table: &Table) -> String {
+    let paper = match dataset_of(&table.set) {
+        Some(Dataset::Simulation) => {
+            " Paper columns: its simulation set, headed \"pixel\" there but in world units."
+        }
+        Some(Dataset::Phantom) => {
+            " Paper columns: its phantom set, which is not public here; ours is a generated set of \
+             the same geometry, so the figures stand side by side but do not answer to each other."
+        }
+        None => "",
+    };
+    format!(
+        "{}, {} cases, distances in {}; means with bootstrap 95 % intervals over the cases that \
+         gave a curve.{paper}",
+        table.set, table.cases, table.unit
+    )
+}
+
+fn markdown(table: &Table) -> String {
+    let (header, rows) = grid(table);
+    let mut text = String::new();
+    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    text.push_str(&line(&header));
+    let rule: Vec<String> = header
+        .iter()
+        .enumerate()
+        .map(|(i, _)| if i < 3 { "---".to_owned() } else { "---:".to_owned() })
+        .collect();
+    text.push_str(&line(&rule));
+    for row in &rows {
+        text.push_str(&line(row));
+    }
+    let _ = write!(text, "\n{}\n", caption(table));
+    text
+}
+
+fn csv(table: &Table) -> String {
+    let mut text = String::from("set,cases,unit,label,input,metric,paper,mean,low,high,scored,failed,note\n");
+    for row in &table.rows {
+        let lead = format!(
+            "{},{},{},\"{}\",{}",
+            table.set, table.cases, table.unit, row.row.label, row.row.input
+        );
+        for column in column_names(table) {
+            let paper = paper_value(table, row, column).map_or_else(String::new, |v| v.to_string());
+            let ours = match &row.result {
+                Ok(m) => m.columns.iter().find(|(n, _)| *n == column).map_or_else(
+                    || format!(",,,{},{},no case gave a curve", m.scored, m.failures.len()),
+                    |(_, i)| {
+                        format!(
+                            "{},{},{},{},{},",
+                            i.mean,
+                            i.low,
+                            i.high,
+                            m.scored,
+                            m.failures.len()
+                        )
+                    },
+                ),
+                Err(reason) => format!(",,,,,{reason}"),
+            };
+            let _ = writeln!(text, "{lead},{column},{paper},{ours}");
+        }
+    }
+    text
+}
+
+fn latex(table: &Table) -> String {
+    let (header, rows) = grid(table);
+    let escape = |s: &String| s.replace('%', "\\%").replace('&', "\\&").replace('<', "$<$");
+    let line = |cells: &[String]| {
+        format!("{} \\\\\n", cells.iter().map(escape).collect::<Vec<_>>().join(" & "))
+    };
+    let mut text = String::from("\\begin{table}\n\\centering\n");
+    let _ = writeln!(text, "\\caption{{{}}}", escape(&caption(table)));
+    let _ = writeln!(text, "\\begin{{tabular}}{{lll{}}}\n\\toprule", "r".repeat(header.len() - 3));
+    text.push_str(&line(&header));
+    text.push_str("\\midrule\n");
+    for row in &rows {
+        text.push_str(&line(row));
+    }
+    text.push_str("\\bottomrule\n\\end{tabular}\n\\end{table}\n");
+    text
+}
+
+fn to_json(table: &Table) -> Value {
+    let rows: Vec<Value> = table
+        .rows
+        .iter()
+        .map(|row| {
+            let mut value = json!({
+                "label": row.row.label,
+                "input": row.row.input.name(),
+                "calibrated": row.row.calibrated,
+                "published_row": row.row.published,
+            });
+            match &row.result {
+                Ok(m) => {
+                    value["metrics"] = m
+                        .columns
+                        .iter()
+                        .map(|(name, i)| {
+                            let metric = json!({
+                                "metric": name,
+                                "paper": paper_value(table, row, name),
+                                "mean": i.mean, "low": i.low, "high": i.high,
+                            });
+                            metric
+                        })
+                        .collect();
+                    value["scored"] = json!(m.scored);
+                    value["failures"] = m
+                        .failures
+                        .iter()
+                        .map(|(case, reason)| json!({"case": case, "reason": reason}))
+                        .collect();
+                }
+                Err(reason) => value["not_available"] = json!(reason),
+            }
+            value
+        })
+        .collect();
+    json!({
+        "set": table.set,
+        "cases": table.cases,
+        "unit": table.unit.label(),
+        "caption": caption(table),
+        "rows": rows,
+    })
+}

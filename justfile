@@ -1,0 +1,36 @@
+# The commands of daily work; `just` lists them.
+default:
+    @just --list
+
+# Everything the gate runs.
+ci:
+    bash .ci/run
+
+# The README's test command.
+test:
+    cargo test --workspace
+
+# Formatting and lints, as the gate wants them.
+lint:
+    cargo fmt --all
+    cargo clippy --workspace --all-targets -- -D warnings
+
+# The paper's table, beside its published figures.
+table *ARGS:
+    cargo run --release -- table {{ARGS}}
+
+# Every published number that can be rerun, against its accepted interval.
+check-table:
+    cargo run --release -- table --check benchmarks/tables/table1.csv
+
+# Growth curves of every stage.
+bench *ARGS:
+    cargo bench -p accurate-speed {{ARGS}}
+
+# The same answers from other people's tools (Python, pinned).
+peers:
+    bash benchmarks/peers/run
+
+# The book, if mdbook is installed.
+book:
+    mdbook build docs
