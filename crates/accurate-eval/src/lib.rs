@@ -1,1 +1,54 @@
-//! Placeholder.
+//! Scores of a reconstructed 3D curve against its truth.
+//!
+//! - [`table_scores`]: the four columns of the paper's table, between point sets.
+//! - [`curve_scores`], [`reprojection_rms`]: between curves, whatever their sampling.
+//! - [`summarise`], [`bootstrap_mean`], [`fraction_below`]: over the cases of a set, failures
+//!   counted, never averaged away.
+//! - [`align_similarity`]: for methods that know neither scale nor pose.
+//! - [`published`]: the paper's own numbers, as data.
+//!
+//! Every number is in the unit of the points handed in, unless its name says px. What cannot be
+//! scored is an [`EvalError`], never a zero.
+//!
+//! ```
+//! use accurate_eval::table_scores;
+//! use accurate_geom::Point3;
+//!
+//! let truth: Vec<Point3> = (0..5).map(|k| Point3::new(f64::from(k), 0.0, 0.0)).collect();
+//! let found: Vec<Point3> = (0..4).map(|k| Point3::new(f64::from(k), 0.5, 0.0)).collect();
+//! let scores = table_scores(&found, &truth)?;
+//! assert_eq!(scores.accuracy, 0.5);
+//! assert_eq!(scores.max_error, 1.25_f64.sqrt()); // the end that was not found
+//! # Ok::<(), accurate_eval::EvalError>(())
+//! ```
+
+mod check;
+mod curve_scores;
+mod error;
+mod frechet;
+mod interval;
+mod nearest;
+mod published;
+mod quantile;
+mod reprojection;
+mod resample;
+mod scores;
+mod summary;
+mod umeyama;
+
+pub use curve_scores::{CurveScores, curve_scores};
+pub use error::EvalError;
+pub use frechet::discrete_frechet;
+pub use interval::{DEFAULT_RESAMPLES, MeanInterval, bootstrap_mean};
+pub use published::{
+    Dataset, Metric, PUBLISHED_ROWS, PublishedCell, PublishedInput, PublishedRow, published,
+    published_cells, published_table,
+};
+pub use quantile::{Proportion, fraction_below, median, quantile, wilson_interval};
+pub use reprojection::{ReprojectionRms, reprojection_rms};
+pub use scores::{TableScores, accuracy, completeness, table_scores};
+pub use summary::{
+    Case, CaseOutcome, Failure, MetricSummary, Summary, TableSummary, bounding_box_diagonal,
+    penalised_means, summarise, summarise_metric,
+};
+pub use umeyama::{Alignment, LEAST_SPREAD_RATIO, Similarity, align_rigid, align_similarity};

@@ -1,0 +1,34 @@
+use accurate_geom::Point3;
+
+use crate::EvalError;
+
+/// Largest absolute coordinate accepted: its square, and sums of squares, stay finite.
+const LARGEST_COORDINATE: f64 = 1e150;
+
+/// Refuses an empty list of points and coordinates that are not finite or overflow when squared.
+pub(crate) fn points(which: &'static str, points: &[Point3]) -> Result<(), EvalError> {
+    if points.is_empty() {
+        return Err(EvalError::Empty { which });
+    }
+    for (index, point) in points.iter().enumerate() {
+        let value = point.coords.amax();
+        if !point.iter().all(|v| v.is_finite()) {
+            return Err(EvalError::NotFinite { which, index });
+        }
+        if value > LARGEST_COORDINATE {
+            return Err(EvalError::TooLarge { which, index, value, limit: LARGEST_COORDINATE });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses an empty list of numbers and numbers that are not finite.
+pub(crate) fn values(which: &'static str, values: &[f64]) -> Result<(), EvalError> {
+    if values.is_empty() {
+        return Err(EvalError::Empty { which });
+    }
+    match values.iter().position(|v| !v.is_finite()) {
+        Some(index) => Err(EvalError::NotFinite { which, index }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,158 @@
+use accurate_geom::Point3;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::{EvalError, check};
+
+/// `x -> scale * rotation * x + translation`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Similarity {
+    /// Scale, positive.
+    pub scale: f64,
+    /// Rotation, determinant +1.
+    pub rotation: Matrix3<f64>,
+    /// Translation, in the unit of the target.
+    pub translation: Vector3<f64>,
+}
+
+impl Similarity {
+    /// The image of a point.
+    pub fn apply(&self, point: &Point3) -> Point3 {
+        Point3::from(self.scale * (self.rotation * point.coords) + self.translation)
+    }
+}
+
+/// A transform fitted to point pairs, and how well the pairs fix it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alignment {
+    /// Target from source.
+    pub target_from_source: Similarity,
+    /// Root of the weighted mean squared distance that remains, in the unit of the target.
+    pub rms: f64,
+    /// Spread of the points off their best line relative to that along it, both sets together: 0 on
+    /// a line, where a rotation about it cannot be seen. Below 1e-3 (a nearly straight wire) the
+    /// roll is noise.
+    pub spread_ratio: f64,
+}
+
+/// Below this [`Alignment::spread_ratio`] rounding decides the rotation, and the fit is refused: the
+/// ratio is the root of one of singular values, of which the smaller is wrong by the machine epsilon
+/// (1.5e-8 after the root).
+pub const LEAST_SPREAD_RATIO: f64 = 1e-6;
+
+/// The similarity that maps `source` onto `target`, point by point, at the least weighted sum of
+/// squared distances. `weights` are not negative; `None` weighs all pairs the same.
+///
+/// # Errors
+/// [`EvalError::LengthMismatch`]; [`EvalError::Empty`], [`EvalError::NotFinite`],
+/// [`EvalError::TooLarge`]; [`EvalError::InvalidArgument`] for a negative weight or all zero;
+/// [`EvalError::Collinear`] if the points lie on a line.
+///
+/// # Source
+/// Umeyama, Least-squares estimation of transformation parameters between two point patterns, 1991,
+/// eqs. 40 to 42, with weights in the means and the covariance.
+pub fn align_similarity(
+    source: &[Point3],
+    target: &[Point3],
+    weights: Option<&[f64]>,
+) -> Result<Alignment, EvalError> {
+    align(source, target, weights, true)
+}
+
+/// The rigid motion (scale 1) that maps `source` onto `target`; otherwise as [`align_similarity`].
+///
+/// # Errors
+/// As [`align_similarity`].
+pub fn align_rigid(
+    source: &[Point3],
+    target: &[Point3],
+    weights: Option<&[f64]>,
+) -> Result<Alignment, EvalError> {
+    align(source, target, weights, false)
+}
+
+fn align(
+    source: &[Point3],
+    target: &[Point3],
+    weights: Option<&[f64]>,
+    scaled: bool,
+) -> Result<Alignment, EvalError> {
+    check::points("source", source)?;
+    check::points("target", target)?;
+    let expected = source.len();
+    if target.len() != expected {
+        return Err(EvalError::LengthMismatch { which: "target", found: target.len(), expected });
+    }
+    let weights = normalised_weights(weights, expected)?;
+    let mean = |points: &[Point3]| {
+        points.iter().zip(&weights).fold(Vector3::zeros(), |sum, (p, w)| sum + p.coords * *w)
+    };
+    let (source_mean, target_mean) = (mean(source), mean(target));
+    let largest = |points: &[Point3], mean: &Vector3<f64>| {
+        points.iter().map(|p| (p.coords - mean).amax()).fold(0.0, f64::max)
+    };
+    let (source_size, target_size) = (largest(source, &source_mean), largest(target, &target_mean));
+    let collinear =
+        |spread_ratio| Err(EvalError::Collinear { spread_ratio, needed: LEAST_SPREAD_RATIO });
+    if source_size == 0.0 || target_size == 0.0 {
+        return collinear(0.0);
+    }
+
+    // Both sets are brought to size 1, so that no product over- or underflows.
+    let mut covariance = Matrix3::zeros();
+    let mut source_variance = 0.0;
+    for ((s, t), w) in source.iter().zip(target).zip(&weights) {
+        let s = (s.coords - source_mean) / source_size;
+        let t = (t.coords - target_mean) / target_size;
+        covariance += t * s.transpose() * *w;
+        source_variance += s.norm_squared() * w;
+    }
+    let svd = covariance.svd(true, true);
+    let singular = svd.singular_values;
+    let spread_ratio = if singular[0] > 0.0 { (singular[1] / singular[0]).sqrt() } else { 0.0 };
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return collinear(spread_ratio) };
+    if spread_ratio < LEAST_SPREAD_RATIO {
+        return collinear(spread_ratio);
+    }
+    let mut signs = Vector3::repeat(1.0);
+    if u.determinant() * v_t.determinant() < 0.0 {
+        signs.z = -1.0;
+    }
+    let rotation = u * Matrix3::from_diagonal(&signs) * v_t;
+    let scale = if scaled {
+        singular.dot(&signs) / source_variance * (target_size / source_size)
+    } else {
+        1.0
+    };
+    let translation = target_mean - scale * (rotation * source_mean);
+    let target_from_source = Similarity { scale, rotation, translation };
+    let squared: f64 = source
+        .iter()
+        .zip(target)
+        .zip(&weights)
+        .map(|((s, t), w)| w * (target_from_source.apply(s) - t).norm_squared())
+        .sum();
+    Ok(Alignment { target_from_source, rms: squared.sqrt(), spread_ratio })
+}
+
+/// Weights with sum 1.
+fn normalised_weights(weights: Option<&[f64]>, expected: usize) -> Result<Vec<f64>, EvalError> {
+    let Some(weights) = weights else {
+        return Ok(vec![1.0 / expected as f64; expected]);
+    };
+    if weights.len() != expected {
+        return Err(EvalError::LengthMismatch { which: "weights", found: weights.len(), expected });
+    }
+    check::values("weights", weights)?;
+    let refuse =
+        |value, expected| Err(EvalError::InvalidArgument { name: "weights", value, expected });
+    if let Some(&negative) = weights.iter().find(|w| **w < 0.0) {
+        return refuse(negative, "not negative");
+    }
+    let largest = weights.iter().copied().fold(0.0, f64::max);
+    if largest == 0.0 {
+        return refuse(0.0, "not all zero");
+    }
+    // By the largest first: the sum of huge weights could overflow.
+    let sum: f64 = weights.iter().map(|w| w / largest).sum();
+    Ok(weights.iter().map(|w| w / largest / sum).collect())
+}
