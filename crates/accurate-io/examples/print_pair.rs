@@ -35,7 +35,13 @@ fn print(case: &Path) -> Result<(), Box<dyn Error>> {
         let (size, c) = (camera.size(), camera.centre());
         println!(
             "  view {number}: {} x {} px, f = ({:.1}, {:.1}) px, centre ({:.2}, {:.2}, {:.2}) {unit}",
-            size.width, size.height, camera.k()[(0, 0)], camera.k()[(1, 1)], c.x, c.y, c.z
+            size.width,
+            size.height,
+            camera.k()[(0, 0)],
+            camera.k()[(1, 1)],
+            c.x,
+            c.y,
+            c.z
         );
     }
     println!(

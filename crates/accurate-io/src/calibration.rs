@@ -1,9 +1,10 @@
 use std::path::{Path, PathBuf};
 
 use accurate_geom::nalgebra::Matrix3;
-use accurate_geom::{Camera, GeomError, ImageSize, LengthUnit, Rig};
+use accurate_geom::{Camera, Distortion, GeomError, ImageSize, LengthUnit, Rig};
 
 use crate::IoError;
+use crate::distortion::read_distortion;
 use crate::matrix::{read_matrix3, read_matrix3x4};
 
 /// The two views of a pair folder: the letter in file names and the name in errors.
@@ -60,4 +61,28 @@ pub(crate) fn read_rig_of_case(
         part: "rig",
         source,
     })
+}
+
+/// The camera of a view with the lens of `calibration/D_L.txt`, if there is one.
+///
+/// `with_pictures`: masks or images are wanted, which only an ideal lens allows.
+pub(crate) fn read_lens(
+    case: &Path,
+    index: usize,
+    camera: &Camera,
+    with_pictures: bool,
+) -> Result<Camera, IoError> {
+    let (letter, part) = VIEWS[index];
+    let path = case.join("calibration").join(format!("D_{letter}.txt"));
+    if !path.is_file() {
+        return Ok(camera.clone());
+    }
+    let lens = read_distortion(&path)?;
+    if with_pictures && lens != Distortion::default() {
+        let what = "masks and images with lens distortion must be undistorted first; \
+                    then remove this file";
+        return Err(IoError::Unsupported { path, what: what.into() });
+    }
+    let geometry = |source| IoError::Geometry { path, part, source };
+    camera.clone().with_distortion(lens).map_err(geometry)
 }

@@ -19,6 +19,7 @@ mod bounded;
 mod calibration;
 mod curve;
 mod curve_csv;
+mod distortion;
 mod error;
 mod find;
 mod finite_check;
@@ -37,6 +38,7 @@ mod vtp;
 
 pub use atomic::{remove_unfinished, write_atomically};
 pub use curve::{Column, CurveTable, read_curve, write_curve};
+pub use distortion::{read_distortion, undistort_points};
 pub use error::IoError;
 pub use find::find_pairs;
 pub use image_file::{

@@ -4,7 +4,8 @@ use accurate_geom::{ImageSize, Pixel, Point3, Rig, View1, View2};
 use ndarray::Array2;
 
 use crate::IoError;
-use crate::calibration::{VIEWS, read_rig_of_case};
+use crate::calibration::{VIEWS, read_lens, read_rig_of_case};
+use crate::distortion::undistort_points;
 use crate::image_file::{BitDepth, GreyImage, read_grey, read_image_size, read_mask};
 use crate::meta::{Meta, check_case_id};
 use crate::ply::read_ply_points;
@@ -91,9 +92,14 @@ pub struct Pair {
 /// folder's name is the case, the masks or images give the size, and the unit is
 /// [`LengthUnit::Unit`](accurate_geom::LengthUnit::Unit).
 ///
+/// Where `calibration/D_L.txt` or `D_R.txt` (`k1 k2 p1 p2 [k3]` of OpenCV) exists, that view's
+/// points are undistorted here, once; the rig is that of the undistorted view. Masks and images are
+/// not resampled: asking for them is then refused.
+///
 /// # Errors
 /// [`IoError::Missing`] naming the first missing file; [`IoError::SizeMismatch`] if image, mask and
-/// `meta.json` disagree; [`IoError::Empty`] for a mask without foreground;
+/// `meta.json` disagree; [`IoError::Unsupported`] for masks or images with lens distortion;
+/// [`IoError::Empty`] for a mask without foreground;
 /// [`IoError::Geometry`] naming the calibration file; and what the readers of the parts report.
 pub fn read_pair(dir: &Path, needs: PairParts) -> Result<Pair, IoError> {
     std::fs::read_dir(dir).map_err(|e| IoError::system(dir, "open folder", e))?;
@@ -127,9 +133,13 @@ pub fn read_pair(dir: &Path, needs: PairParts) -> Result<Pair, IoError> {
     }
     let rig = read_rig_of_case(dir, size, &size_sources[0], unit)?;
 
+    let lens1 = read_lens(dir, 0, rig.camera1(), needs.masks || needs.images)?;
+    let lens2 = read_lens(dir, 1, rig.camera2(), needs.masks || needs.images)?;
     let points = if needs.points {
-        let path = |v: usize| dir.join(points_name(VIEWS[v].0));
-        Some((read_points(&path(0))?, read_points(&path(1))?))
+        let [path1, path2] = VIEWS.map(|v| dir.join(points_name(v.0)));
+        let points1 = undistort_points(&path1, &lens1, &read_points(&path1)?)?;
+        let points2 = undistort_points(&path2, &lens2, &read_points(&path2)?)?;
+        Some((points1, points2))
     } else {
         None
     };

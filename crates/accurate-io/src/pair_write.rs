@@ -61,7 +61,7 @@ impl From<Pair> for PairContents {
 /// # Errors
 /// Found before anything is written: [`IoError::Field`] for a case name that is no folder name,
 /// [`IoError::SizeMismatch`] if a mask or image has not the camera's size, [`IoError::Empty`],
-/// [`IoError::NotFinite`]. Then [`IoError::System`], and [`IoError::Field`] for a grey value
+/// [`IoError::NotFinite`], [`IoError::Unsupported`] for a rig with lens distortion. Then [`IoError::System`], and [`IoError::Field`] for a grey value
 /// outside its depth.
 pub fn write_pair(dir: &Path, contents: &PairContents) -> Result<(), IoError> {
     check(dir, contents)?;
@@ -124,6 +124,10 @@ fn check(dir: &Path, contents: &PairContents) -> Result<(), IoError> {
         return Err(IoError::Empty { path: dir.join(TRUTH_NAME), what: "points" });
     }
     for (v, camera) in [contents.rig.camera1(), contents.rig.camera2()].into_iter().enumerate() {
+        if camera.distortion().is_some() {
+            let what = "a pair folder holds undistorted pixels; give the rig without distortion";
+            return Err(IoError::Unsupported { path: dir.to_owned(), what: what.into() });
+        }
         let expected = camera.size();
         let same = |path: std::path::PathBuf, (height, width): (usize, usize)| {
             if (height, width) == (expected.height as usize, expected.width as usize) {

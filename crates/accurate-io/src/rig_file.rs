@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use accurate_geom::nalgebra::{Matrix3, Vector3};
-use accurate_geom::{Camera, ImageSize, Rig};
+use accurate_geom::{Camera, Distortion, ImageSize, Rig};
 use serde::{Deserialize, Serialize};
 
 use crate::IoError;
@@ -44,7 +44,8 @@ struct ViewFile {
 /// distortion = [0.0, 0.0, 0.0, 0.0, 0.0]   # k1 k2 p1 p2 k3 of OpenCV; may be left out
 /// ```
 ///
-/// Unknown fields are refused: a misspelt `distortion` must not be lost.
+/// Unknown fields are refused: a misspelt `distortion` must not be lost. It is given to the cameras;
+/// [`undistort_points`](crate::undistort_points) removes it from points.
 ///
 /// # Errors
 /// [`IoError::Malformed`] with the line; [`IoError::Field`] for an unknown unit;
@@ -99,18 +100,12 @@ impl ViewFile {
             k: rows(camera.k()),
             r: rows(camera.r()),
             t: (*camera.t()).into(),
-            distortion: None,
+            distortion: camera.distortion().map(|d| [d.k1, d.k2, d.p1, d.p2, d.k3]),
         }
     }
 
     fn camera(&self, path: &Path, part: &'static str) -> Result<Camera, IoError> {
         let matrix = |rows: &[[f64; 3]; 3]| Matrix3::from_fn(|r, c| rows[r][c]);
-        if self.distortion.is_some_and(|d| d.iter().any(|v| *v != 0.0)) {
-            return Err(IoError::Unsupported {
-                path: path.to_owned(),
-                what: format!("{part} has lens distortion; undistort first and leave it out"),
-            });
-        }
         let [width, height] = self.image_size;
         Camera::new(
             matrix(&self.k),
@@ -118,6 +113,10 @@ impl ViewFile {
             Vector3::from(self.t),
             ImageSize { width, height },
         )
+        .and_then(|camera| match self.distortion {
+            Some([k1, k2, p1, p2, k3]) => camera.with_distortion(Distortion { k1, k2, p1, p2, k3 }),
+            None => Ok(camera),
+        })
         .map_err(|source| IoError::Geometry { path: path.to_owned(), part, source })
     }
 }

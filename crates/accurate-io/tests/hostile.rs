@@ -65,8 +65,28 @@ fn matrix(path: &Path) -> Result<bool, IoError> {
 
 /// What hostile hands like to put in place of a field.
 const FIELDS: [&str; 22] = [
-    "", " ", "0", "-1", "1", "3", "nan", "-inf", "1e999", "99999999999999999999", "1000000000000",
-    "2147483648", "65536", "0x10", "\u{0}", "\u{feff}", "\"", "<", "[[[[[[[[", "\n", "ascii", "é",
+    "",
+    " ",
+    "0",
+    "-1",
+    "1",
+    "3",
+    "nan",
+    "-inf",
+    "1e999",
+    "99999999999999999999",
+    "1000000000000",
+    "2147483648",
+    "65536",
+    "0x10",
+    "\u{0}",
+    "\u{feff}",
+    "\"",
+    "<",
+    "[[[[[[[[",
+    "\n",
+    "ascii",
+    "é",
 ];
 
 fn mutated(seed: &[u8], stream: &mut Stream) -> Vec<u8> {
@@ -163,7 +183,8 @@ fn seeds(dir: &Path) -> Vec<(&'static str, Read)> {
     write_u8(&dir.join("grey8.png"), &image8).unwrap();
     write_u16(&dir.join("grey16.png"), &image8.mapv(u16::from)).unwrap();
     let encode = |format| {
-        let rgb = image::RgbImage::from_fn(24, 16, |x, y| image::Rgb([x as u8 * 9, y as u8 * 9, 50]));
+        let rgb =
+            image::RgbImage::from_fn(24, 16, |x, y| image::Rgb([x as u8 * 9, y as u8 * 9, 50]));
         let mut bytes = std::io::Cursor::new(Vec::new());
         image::DynamicImage::ImageRgb8(rgb).write_to(&mut bytes, format).unwrap();
         bytes.into_inner()
@@ -218,7 +239,8 @@ fn no_truncated_or_mutated_file_is_more_than_an_error() {
         for k in 0..MUTATIONS {
             let mut stream = Stream(1_000_000 * number as u64 + k);
             let bytes = mutated(&seed, &mut stream);
-            accepted += usize::from(survives(&path, &bytes, read, &format!("{name}, mutation {k}")));
+            accepted +=
+                usize::from(survives(&path, &bytes, read, &format!("{name}, mutation {k}")));
             total += 1;
         }
         println!("{name}: {accepted} of {MUTATIONS} mutations are still valid");

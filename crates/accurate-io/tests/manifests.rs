@@ -13,8 +13,16 @@ fn every_manifest_of_the_repository_is_complete() {
     assert_eq!(
         names,
         [
-            "accurate-paper", "carm", "guide3d", "helix", "loops-easy", "loops-hard",
-            "loops-medium", "sim-paper", "tangency", "xa-phantom"
+            "accurate-paper",
+            "carm",
+            "guide3d",
+            "helix",
+            "loops-easy",
+            "loops-hard",
+            "loops-medium",
+            "sim-paper",
+            "tangency",
+            "xa-phantom"
         ]
     );
     for manifest in &manifests {

@@ -7,10 +7,10 @@ use std::fs;
 use std::path::Path;
 
 use accurate_geom::nalgebra::Matrix3x4;
-use accurate_geom::{ImageSize, LengthUnit};
+use accurate_geom::{Distortion, ImageSize, LengthUnit, Pixel, View1};
 use accurate_io::{
     BitDepth, GreyImage, IoError, Pair, PairContents, PairParts, Truth, find_pairs, read_pair,
-    write_mask, write_matrix3, write_matrix3x4, write_pair, write_u8,
+    write_mask, write_matrix3, write_matrix3x4, write_pair, write_points, write_u8,
 };
 use common::{contents, rig};
 use ndarray::Array2;
@@ -221,7 +221,10 @@ fn what_cannot_be_read_back_is_not_written() {
     let shape = good.masks.as_ref().unwrap()[0].dim();
     let mut table: Vec<(PairContents, &str)> = Vec::new();
     table.push((PairContents { case_id: "a/b".into(), ..good.clone() }, "case_id = `a/b`"));
-    table.push((PairContents { truth: Some(vec![]), ..good.clone() }, "guidewire_3D.ply: no points"));
+    table.push((
+        PairContents { truth: Some(vec![]), ..good.clone() },
+        "guidewire_3D.ply: no points",
+    ));
     let masks = Some([Array2::from_elem((2, 2), true), Array2::from_elem(shape, true)]);
     table.push((PairContents { masks, ..good.clone() }, "mask_L.png is 2 x 2 px"));
     let mut points = good.points.clone().unwrap();
@@ -278,8 +281,48 @@ fn a_written_pair_leaves_no_temporary_file() {
     assert_eq!(
         names,
         [
-            "K_L.txt", "K_R.txt", "RT_L.txt", "RT_R.txt", "guidewire_3D.ply", "mask_L.png",
-            "mask_R.png", "meta.json", "points_L.csv", "points_R.csv", "view_L.png", "view_R.png"
+            "K_L.txt",
+            "K_R.txt",
+            "RT_L.txt",
+            "RT_R.txt",
+            "guidewire_3D.ply",
+            "mask_L.png",
+            "mask_R.png",
+            "meta.json",
+            "points_L.csv",
+            "points_R.csv",
+            "view_L.png",
+            "view_R.png"
         ]
     );
+}
+
+#[test]
+fn points_behind_a_lens_are_undistorted_once_and_pictures_refused() {
+    let (_set, case, contents) = pair();
+    let lens = Distortion { k1: -0.2, k2: 0.05, p1: 1e-3, p2: -2e-3, k3: 0.0 };
+    let camera = contents.rig.camera1().clone().with_distortion(lens).unwrap();
+    let ideal: Vec<Pixel<View1>> =
+        (0..20).map(|i| Pixel::new(f64::from(2 * i), 3.0 + f64::from(i))).collect();
+    let seen: Vec<Pixel<View1>> =
+        ideal.iter().map(|p| camera.distort(&p.point()).unwrap().into()).collect();
+    write_points(&case.join("points/points_L.csv"), &seen).unwrap();
+    fs::write(case.join("calibration/D_L.txt"), "-0.2 0.05 1e-3\n-2e-3").unwrap();
+
+    let points = PairParts { points: true, ..CALIBRATION };
+    let read = read_pair(&case, points).unwrap();
+    assert_eq!(read.rig, contents.rig, "the rig is that of the undistorted view");
+    // Newton stops at 64 rounding errors of the normalised coordinate (below 1 here), times f.
+    let tol_px = 64.0 * f64::EPSILON * 51.0;
+    for (p, q) in read.points.unwrap().0.iter().zip(&ideal) {
+        assert!(p.distance(*q) < tol_px, "{p:?} {q:?}");
+    }
+    for needs in [PairParts { masks: true, ..points }, PairParts { images: true, ..points }] {
+        let error = read_pair(&case, needs).unwrap_err();
+        assert!(matches!(error, IoError::Unsupported { .. }), "{error}");
+        assert_eq!(error.path(), case.join("calibration/D_L.txt"));
+    }
+    // A lens that bends nothing stands in nobody's way.
+    fs::write(case.join("calibration/D_L.txt"), "0 0 0 0 0").unwrap();
+    read_pair(&case, ALL).unwrap();
 }

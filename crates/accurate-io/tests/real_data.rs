@@ -24,8 +24,7 @@ fn all_guide3d_pairs_are_read() {
     let cases = find_pairs(&set).unwrap();
     assert_eq!(cases.len(), 12);
     for (i, case) in cases.iter().enumerate() {
-        let needs =
-            PairParts { points: true, truth: Truth::IfPresent, ..PairParts::default() };
+        let needs = PairParts { points: true, truth: Truth::IfPresent, ..PairParts::default() };
         let pair = read_pair(case, needs).unwrap();
         assert_eq!(pair.case_id, format!("case_{i:03}"));
         assert_eq!(pair.rig.unit(), LengthUnit::Centimetre);

@@ -6,7 +6,7 @@ mod common;
 use std::fs;
 
 use accurate_geom::nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector3};
-use accurate_geom::{Camera, ImageSize, LengthUnit, Pixel, Point3, Rig, View1};
+use accurate_geom::{Camera, Distortion, ImageSize, LengthUnit, Pixel, Point3, Rig, View1};
 use accurate_io::{
     BitDepth, Column, CurveTable, GreyImage, PairContents, PairParts, PlyEncoding, Truth,
     read_curve, read_grey, read_mask, read_matrix3, read_matrix3x4, read_pair, read_ply_points,
@@ -67,19 +67,23 @@ fn column_bits(curve: &CurveTable) -> Vec<(&str, &str, Vec<u64>)> {
     curve.columns.iter().map(|c| (c.name.as_str(), c.unit.as_str(), of(c))).collect()
 }
 
-fn rigs() -> impl Strategy<Value = Rig> {
+fn rigs(lenses: bool) -> impl Strategy<Value = Rig> {
     let view = (
         [-4e3..4e3_f64, -4e3..4e3, -9.0..9.0, -900.0..900.0, -900.0..900.0],
         [-3.0..3.0_f64, -3.0..3.0, -3.0..3.0],
         [-1e3..1e3_f64, -1e3..1e3, -1e3..1e3],
         (1..5000_u32, 1..5000_u32),
+        prop::option::of([-0.3..0.3_f64, -0.1..0.1, -1e-2..1e-2, -1e-2..1e-2, -0.1..0.1]),
     );
-    ([view.clone(), view], units()).prop_filter_map("degenerate rig", |(views, unit)| {
-        let mut cameras = views.into_iter().map(|([fx, fy, s, cx, cy], r, t, (width, height))| {
-            let k = Matrix3::new(fx, s, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
-            let r = Rotation3::from_euler_angles(r[0], r[1], r[2]).into_inner();
-            Camera::new(k, r, Vector3::from(t), ImageSize { width, height })
-        });
+    ([view.clone(), view], units()).prop_filter_map("degenerate rig", move |(views, unit)| {
+        let mut cameras =
+            views.into_iter().map(|([fx, fy, s, cx, cy], r, t, (width, height), lens)| {
+                let k = Matrix3::new(fx, s, cx, 0.0, fy, cy, 0.0, 0.0, 1.0);
+                let r = Rotation3::from_euler_angles(r[0], r[1], r[2]).into_inner();
+                let camera = Camera::new(k, r, Vector3::from(t), ImageSize { width, height })?;
+                let Some([k1, k2, p1, p2, k3]) = lens.filter(|_| lenses) else { return Ok(camera) };
+                camera.with_distortion(Distortion { k1, k2, p1, p2, k3 })
+            });
         Rig::new(cameras.next()?.ok()?, cameras.next()?.ok()?, unit).ok()
     })
 }
@@ -124,7 +128,7 @@ proptest! {
     }
 
     #[test]
-    fn a_rig_keeps_every_bit_in_toml_and_json(rig in rigs()) {
+    fn a_rig_keeps_every_bit_in_toml_and_json(rig in rigs(true)) {
         let folder = tempfile::tempdir().unwrap();
         for name in ["rig.toml", "rig.json"] {
             let path = folder.path().join(name);
@@ -182,7 +186,7 @@ proptest! {
     }
 
     #[test]
-    fn a_whole_pair_folder_comes_back(seed in any::<u64>(), parts in any::<[bool; 4]>(), rig in rigs()) {
+    fn a_whole_pair_folder_comes_back(seed in any::<u64>(), parts in any::<[bool; 4]>(), rig in rigs(false)) {
         let folder = tempfile::tempdir().unwrap();
         let mut contents = common::contents(seed);
         let images = parts[1] || parts[2];
