@@ -45,9 +45,10 @@ impl Background {
     }
 }
 
-/// Value of a grid between its nodes; coordinates must lie on the grid.
+/// Value of a grid (2 x 2 or larger) between its nodes; past its last nodes it goes on linearly.
 fn bilinear(grid: &Array2<f64>, x: f64, y: f64) -> f64 {
-    let (column, row) = (x as usize, y as usize);
+    let column = (x as usize).min(grid.ncols() - 2);
+    let row = (y as usize).min(grid.nrows() - 2);
     let (u, v) = (x - column as f64, y - row as f64);
     let top = grid[[row, column]] * (1.0 - u) + grid[[row, column + 1]] * u;
     let bottom = grid[[row + 1, column]] * (1.0 - u) + grid[[row + 1, column + 1]] * u;
@@ -203,7 +204,7 @@ fn add_vessel(rng: &mut ChaCha8Rng, grid: &mut Array2<f64>, scale: f64, tall: f6
     let mut tube = Array2::<f64>::zeros(grid.dim());
     for _ in 0..(length / ds) as usize {
         heading += turning * ds;
-        turning += rng.random_range(-1.0..1.0) * 40.0 * ds.sqrt() * ds.sqrt();
+        turning += rng.random_range(-1.0..1.0) * 40.0 * ds;
         x += heading.cos() * ds;
         y += heading.sin() * ds;
         radius = (radius * (1.0 - 0.4 * ds)).max(0.003);

@@ -42,7 +42,7 @@ pub struct SynthCase {
     pub exact_arc_lengths: (Vec<f64>, Vec<f64>),
     /// The paper's protocol: truth points rounded to integer pixels through a z-buffer (each pixel
     /// keeps the nearest), visible ones in the order of the truth, one per pixel. Missing stretches
-    /// are left out; of the other families' curves neighbours are at most one pixel apart too.
+    /// are left out.
     pub rounded_points: (Vec<Pixel<View1>>, Vec<Pixel<View2>>),
     /// True where the pixel's centre is within half the mask thickness of the projected curve and
     /// not hidden; shape (height, width), one per view.

@@ -1,7 +1,7 @@
 //! What is taken away from a view, and what the nominal camera gets wrong.
 
-use accurate_geom::nalgebra::{Rotation3, Unit, Vector3};
 use accurate_geom::{Camera, GeomError, Point2};
+use nalgebra::{Rotation3, Unit, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::UnitSphere;

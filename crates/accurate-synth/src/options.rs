@@ -64,7 +64,7 @@ impl CaseOptions {
         }
         within("occlusion_radius_px", self.occlusion_radius_px, 0.0..=1e4, "0 to 10000 px")?;
         let lengths = &self.gap_length_px;
-        if lengths.is_empty() || !(*lengths.start() > 0.0) || !(*lengths.end() <= 1e4) {
+        if lengths.is_empty() || *lengths.start() <= 0.0 || *lengths.end() > 1e4 {
             return Err(bad("gap_length_px", lengths, "low..=high with 0 < low <= high <= 10000"));
         }
         if let Some(error) = self.calibration_error {

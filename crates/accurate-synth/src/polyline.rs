@@ -1,4 +1,4 @@
-use accurate_geom::nalgebra::{DefaultAllocator, DimName, OPoint, allocator::Allocator};
+use nalgebra::{DefaultAllocator, DimName, OPoint, allocator::Allocator};
 
 /// Cumulative length at every vertex; starts with 0. Empty for no points.
 pub(crate) fn arc_lengths<D: DimName>(points: &[OPoint<f64, D>]) -> Vec<f64>

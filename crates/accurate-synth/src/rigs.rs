@@ -1,7 +1,7 @@
 //! The cameras of the families.
 
-use accurate_geom::nalgebra::{Matrix3, RowVector3, Vector3};
 use accurate_geom::{Camera, GeomError, ImageSize, Point3};
+use nalgebra::{Matrix3, RowVector3, Vector3};
 
 /// A pinhole of the given focal lengths and principal point, px.
 pub(crate) fn intrinsics(fx: f64, fy: f64, cx: f64, cy: f64) -> Matrix3<f64> {

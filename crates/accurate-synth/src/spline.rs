@@ -1,5 +1,5 @@
 use accurate_geom::Point3;
-use accurate_geom::nalgebra::Vector3;
+use nalgebra::Vector3;
 
 /// Samples of the natural cubic spline through two or more distinct knots, parametrised by chord
 /// length: `per_segment` samples per segment and the last knot.

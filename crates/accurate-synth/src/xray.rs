@@ -306,9 +306,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_wire_keeps_its_mass_wherever_it_lies_between_pixels(r in 0.1..6.0, offset in 0.0..1.0) {
+        fn a_wire_keeps_its_mass_wherever_it_lies_between_pixels(r in 0.1..6.0, offset in 0.0..1.0_f64) {
             // Sum over pixels of the mean chord = area of the circle, in units of the diameter.
-            let sum: f64 = (-10..=10).map(|k| mean_chord((f64::from(k) - offset).abs(), r)).sum();
+            let sum: f64 = (-10..=10_i32).map(|k| mean_chord((f64::from(k) - offset).abs(), r)).sum();
             let area = std::f64::consts::PI * r * r / (2.0 * r);
             prop_assert!((sum - area).abs() < 1e-12 * area, "{sum} {area}");
         }

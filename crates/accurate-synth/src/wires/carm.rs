@@ -1,7 +1,7 @@
 use std::f64::consts::TAU;
 
-use accurate_geom::nalgebra::{Rotation3, Vector3};
 use accurate_geom::{GeomError, ImageSize, LengthUnit, Point3, Rig};
+use nalgebra::{Rotation3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::UnitBall;

@@ -6,8 +6,8 @@ mod sim_paper;
 mod tangency;
 mod walk;
 
-use accurate_geom::nalgebra::Vector3;
 use accurate_geom::{GeomError, ImageSize, LengthUnit, Point3, Rig};
+use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::UnitSphere;

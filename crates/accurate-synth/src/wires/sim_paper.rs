@@ -1,5 +1,5 @@
-use accurate_geom::nalgebra::Vector3;
 use accurate_geom::{GeomError, ImageSize, LengthUnit, Point3, Rig};
+use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -138,9 +138,8 @@ mod tests {
             if length < 80.0 {
                 prop_assert_eq!(n, 10);
                 prop_assert!(points.iter().all(|p| p.x.abs() <= 5.0 && p.y.abs() <= 5.0));
-                prop_assert!(points.iter().enumerate().all(|(i, p)| {
-                    (p.z - length * i as f64 / 9.0).abs() <= 5.0
-                }));
+                let off = |(i, p): (usize, &Point3)| (p.z - length * i as f64 / 9.0).abs();
+                prop_assert!(points.iter().enumerate().map(off).all(|dz| dz <= 5.0));
             } else {
                 prop_assert_eq!(n, (length / 10.0) as usize + 10);
                 prop_assert!((18..=21).contains(&n));

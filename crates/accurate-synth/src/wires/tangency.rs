@@ -1,5 +1,5 @@
-use accurate_geom::nalgebra::Vector3;
 use accurate_geom::{GeomError, Point3};
+use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::UnitBall;

@@ -1,7 +1,7 @@
 use std::ops::RangeInclusive;
 
-use accurate_geom::nalgebra::Vector3;
 use accurate_geom::{GeomError, Point3};
+use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{StandardNormal, UnitBall};
