@@ -3,7 +3,7 @@
 
 use std::hint::black_box;
 
-use accurate3d::eval::{CurveScores, TableScores};
+use accurate3d::eval::{curve_scores, table_scores};
 use accurate3d::geom::{Pixel, Point3, Triangulation, Triangulator, View1, View2};
 use accurate3d::matching::{CurveMatcher, Ecdp, EcdpParams};
 use accurate3d::seg::{Mask, Skeleton, zhang_suen};
@@ -115,12 +115,12 @@ fn metrics(c: &mut Criterion) {
         let curve: Vec<Point3> = truth.iter().map(|p| p + (p.coords.yzx() * 1e-3)).collect();
         group.throughput(Throughput::Elements(n as u64));
         group.bench_with_input(BenchmarkId::new("table", n), &n, |b, _| {
-            b.iter(|| TableScores::of(black_box(&curve), black_box(&truth)).unwrap());
+            b.iter(|| table_scores(black_box(&curve), black_box(&truth)).unwrap());
         });
         if n <= 2048 {
             let spacing = case.length() / n as f64;
             group.bench_with_input(BenchmarkId::new("polyline", n), &n, |b, _| {
-                b.iter(|| CurveScores::of(black_box(&curve), black_box(&truth), spacing).unwrap());
+                b.iter(|| curve_scores(black_box(&curve), black_box(&truth), spacing).unwrap());
             });
         }
     }

@@ -114,8 +114,11 @@ fn pure_crates_open_no_file_and_read_no_clock() {
         for file in rust_files(&path.join("src")) {
             let text = fs::read_to_string(&file).unwrap();
             // Documentation may speak of them; code may not.
-            let code: String =
-                text.lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+            let code: String = text
+                .lines()
+                .filter(|l| !l.trim_start().starts_with("//"))
+                .collect::<Vec<_>>()
+                .join("\n");
             for word in forbidden {
                 assert!(!code.contains(word), "{} uses {word}", file.display());
             }

@@ -4,9 +4,11 @@
 
 use std::path::PathBuf;
 
-use accurate3d::eval::TableScores;
+use accurate3d::eval::table_scores;
 use accurate3d::geom::{Fundamental, Triangulation, Triangulator, View1, View2};
-use accurate3d::io::{CurveTable, write_curve, write_json, write_mask, write_matrix3, write_points};
+use accurate3d::io::{
+    CurveTable, write_curve, write_json, write_mask, write_matrix3, write_points,
+};
 use accurate3d::matching::{CurveMatcher, Ecdp, EcdpParams};
 use accurate3d::seg::{Mask, zhang_suen};
 use accurate3d::synth::{CaseOptions, Family, generate};
@@ -50,7 +52,7 @@ fn main() {
             write_curve(&dir.join("dlt.csv"), &table(triangulated)).unwrap();
             write_curve(&dir.join("curve.csv"), &table(curve.clone())).unwrap();
             write_curve(&dir.join("truth.csv"), &table(case.truth.clone())).unwrap();
-            let scores = TableScores::of(&curve, &case.truth).unwrap();
+            let scores = table_scores(&curve, &case.truth).unwrap();
             let projection = |camera: &accurate3d::geom::Camera| -> Vec<Vec<f64>> {
                 let p = camera.projection_matrix();
                 (0..3).map(|r| (0..4).map(|c| p[(r, c)]).collect()).collect()

@@ -1,5 +1,6 @@
 use std::fmt;
 
+use accurate_eval::EvalError;
 use accurate_match::MatchError;
 use accurate_seg::SegError;
 use accurate_synth::SynthError;
@@ -76,6 +77,9 @@ pub enum Error {
     /// A name stands for nothing.
     #[error(transparent)]
     Name(#[from] UnknownName),
+    /// A mean or interval could not be formed.
+    #[error(transparent)]
+    Scoring(#[from] EvalError),
     /// A case could not be generated.
     #[error(transparent)]
     Synthesis(#[from] SynthError),
@@ -88,7 +92,9 @@ impl Error {
             Self::Segmentation { .. } | Self::NoNetwork { .. } => Some(Stage::Segmentation),
             Self::Traversal { .. } => Some(Stage::Traversal),
             Self::Matching { .. } => Some(Stage::Matching),
-            Self::MissingInput { .. } | Self::Name(_) | Self::Synthesis(_) => None,
+            Self::MissingInput { .. } | Self::Name(_) | Self::Scoring(_) | Self::Synthesis(_) => {
+                None
+            }
         }
     }
 }

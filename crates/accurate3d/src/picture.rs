@@ -96,9 +96,8 @@ fn curve_panel(svg: &mut String, left: f64, pair: &ViewPair, reconstruction: &Re
     let reference = if truth.is_empty() { &curve[..] } else { truth };
     let flatten = principal_plane(reference);
     let points: Vec<Point2> = reference.iter().chain(&curve).map(&flatten).collect();
-    let (low, high) = points.iter().fold((points[0], points[0]), |(low, high), p| {
-        (low.inf(p), high.sup(p))
-    });
+    let (low, high) =
+        points.iter().fold((points[0], points[0]), |(low, high), p| (low.inf(p), high.sup(p)));
     let extent = (high - low).amax().max(f64::MIN_POSITIVE);
     let scale = (PANEL - 50.0) / extent;
     let centre = Point2::from((low.coords + high.coords) / 2.0);
@@ -184,7 +183,14 @@ fn principal_plane(points: &[Point3]) -> impl Fn(&Point3) -> Point2 + use<> {
 fn nice_length(length: f64) -> f64 {
     let power = 10f64.powf(length.log10().floor());
     let lead = length / power;
-    power * if lead >= 5.0 { 5.0 } else if lead >= 2.0 { 2.0 } else { 1.0 }
+    power
+        * if lead >= 5.0 {
+            5.0
+        } else if lead >= 2.0 {
+            2.0
+        } else {
+            1.0
+        }
 }
 
 fn escape(text: &str) -> String {

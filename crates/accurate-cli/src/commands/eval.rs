@@ -1,4 +1,4 @@
-use accurate3d::eval::{CurveScores, TableScores, reprojection_rms};
+use accurate3d::eval::{self, curve_scores, reprojection_rms};
 use accurate3d::geom::Point3;
 use accurate3d::io::{PairParts, Truth, read_curve, read_pair};
 use serde_json::{Value, json};
@@ -14,7 +14,7 @@ pub fn run(args: &EvalArgs, console: &Console) -> Result<(), Failure> {
     let mut scores = table_scores(&curve.points, &truth.points)?;
     scores["unit"] = json!(curve.unit.label());
     let spacing = args.spacing.unwrap_or_else(|| polyline_length(&truth.points) / 4000.0);
-    let polyline = CurveScores::of(&curve.points, &truth.points, spacing)?;
+    let polyline = curve_scores(&curve.points, &truth.points, spacing)?;
     scores["polyline"] = json!({
         "spacing": spacing,
         "accuracy": polyline.accuracy,
@@ -26,18 +26,17 @@ pub fn run(args: &EvalArgs, console: &Console) -> Result<(), Failure> {
         "length_error": polyline.length_error,
     });
     if let Some(dir) = &args.pair {
-        let parts =
-            PairParts { points: false, masks: false, images: false, truth: Truth::Ignore };
+        let parts = PairParts { points: false, masks: false, images: false, truth: Truth::Ignore };
         let pair = read_pair(dir, parts)?;
-        let rms = reprojection_rms(&curve.points, &truth.points, &pair.rig)?;
-        scores["reprojection_rms_px"] = json!(rms);
+        let rms = reprojection_rms(&curve.points, &truth.points, &pair.rig, spacing)?;
+        scores["reprojection_rms_px"] = json!([rms.view1_px, rms.view2_px]);
     }
     console.json(&scores)
 }
 
 /// The paper's four scores.
 pub fn table_scores(curve: &[Point3], truth: &[Point3]) -> Result<Value, Failure> {
-    let s = TableScores::of(curve, truth)?;
+    let s = eval::table_scores(curve, truth)?;
     Ok(json!({
         "accuracy": s.accuracy,
         "completeness": s.completeness,

@@ -33,7 +33,11 @@ pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
     for result in results {
         match result {
             Ok((line, value)) => {
-                if console.json { console.json(&value)? } else { console.data(&line)? }
+                if console.json {
+                    console.json(&value)?
+                } else {
+                    console.data(&line)?
+                }
             }
             Err(failure) => {
                 failed += 1;

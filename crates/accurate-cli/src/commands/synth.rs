@@ -32,7 +32,10 @@ pub fn contents_of(
     images: Option<[GreyImage; 2]>,
 ) -> PairContents {
     PairContents {
-        source: Some(format!("accurate synth {} seed {} case {}", case.family, case.seed, case.index)),
+        source: Some(format!(
+            "accurate synth {} seed {} case {}",
+            case.family, case.seed, case.index
+        )),
         case_id: case.id,
         rig: case.rig,
         points: Some(match points {

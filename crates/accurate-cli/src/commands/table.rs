@@ -27,7 +27,10 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
     }
     let rows: Vec<Row> = paper_rows().into_iter().filter(|row| wanted(row, args)).collect();
     if rows.is_empty() {
-        return Err(Failure::new(Failure::USAGE, "no row of the table has these methods and inputs"));
+        return Err(Failure::new(
+            Failure::USAGE,
+            "no row of the table has these methods and inputs",
+        ));
     }
     let bar = console.progress(set.len(), "measuring");
     let table = measure(&set, &rows, args.scores, &|| bar.inc(1))?;
@@ -38,7 +41,7 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
         None => {
             let (header, rows) = grid(&table);
             let mut terminal = TerminalTable::new();
-            terminal.load_preset(comfy_table::presets::ASCII_MARKDOWN).set_header(header);
+            terminal.load_style(comfy_table::presets::ASCII_MARKDOWN).set_header(header);
             terminal.add_rows(rows);
             format!("{terminal}\n")
         }

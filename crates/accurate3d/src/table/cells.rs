@@ -20,7 +20,7 @@ pub struct Cell {
     pub row: String,
     /// `simulation` or `phantom`.
     pub dataset: String,
-    /// Column: `Acc`, `Comp`, `Overall` or `Max Err`.
+    /// Column: `Acc.`, `Comp.`, `Overall` or `Max Err.`.
     pub metric: String,
     /// The paper's value.
     pub paper: f64,
@@ -71,10 +71,7 @@ pub fn parse_cells(text: &str) -> Result<Vec<Cell>, String> {
 ///
 /// # Errors
 /// [`Error::Synthesis`], or [`Error::Name`] if a cell names an unknown set or method.
-pub fn check_cells(
-    cells: &[Cell],
-    on_case: &(dyn Fn() + Sync),
-) -> Result<Vec<CellCheck>, Error> {
+pub fn check_cells(cells: &[Cell], on_case: &(dyn Fn() + Sync)) -> Result<Vec<CellCheck>, Error> {
     let sets: BTreeSet<&str> =
         cells.iter().filter(|c| !c.method.is_empty()).map(|c| c.set.as_str()).collect();
     let mut tables: Vec<(&str, Table)> = Vec::new();
@@ -120,13 +117,12 @@ fn check(cell: &Cell, tables: &[(&str, Table)]) -> Result<CellCheck, Error> {
         .filter(|(set, _)| *set == cell.set)
         .flat_map(|(_, table)| &table.rows)
         .filter(|row| {
-            row.row.published == Some(cell.row.as_str())
-                && row.row.outcome == Outcome::Run(method)
+            row.row.published == Some(cell.row.as_str()) && row.row.outcome == Outcome::Run(method)
         })
         .filter_map(|row| row.result.as_ref().ok())
         .flat_map(|measured| &measured.columns)
         .find(|(name, _)| *name == cell.metric)
-        .map(|(_, interval)| interval.mean);
+        .map(|(_, figure)| figure.value);
     // A cell whose row or column does not exist has measured nothing, and that is a failure.
     let accepted = measured.is_some_and(|value| (low..=high).contains(&value));
     Ok(CellCheck { cell: cell.clone(), measured, accepted })

@@ -1,4 +1,7 @@
-use accurate_eval::{CurveScores, Interval, TableScores, bootstrap_mean, quantile};
+use accurate_eval::{
+    CurveScores, DEFAULT_RESAMPLES, EvalError, Metric, TableScores, bootstrap_mean, curve_scores,
+    fraction_below, quantile, table_scores,
+};
 use accurate_geom::{LengthUnit, Point3, Rig};
 use accurate_synth::{CaseOptions, Family, generate};
 use rayon::prelude::*;
@@ -79,22 +82,30 @@ impl CaseSet {
     }
 }
 
-/// The scores of one case.
+/// The scores of one case, of the kind the table shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scored {
-    /// The paper's scores.
-    pub table: TableScores,
-    /// Point-to-polyline scores.
-    pub curve: CurveScores,
-    /// World length that one pixel sees at the truth's centre, mean over both views.
-    pub world_per_px: f64,
+enum Scored {
+    Table(TableScores),
+    /// Point-to-polyline scores, and the world length that one pixel sees at the truth's centre.
+    Polyline(CurveScores, f64),
+}
+
+/// A mean with its 95 % interval; a median or quantile has none and repeats its value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Figure {
+    /// The value itself.
+    pub value: f64,
+    /// Lower end of the interval.
+    pub low: f64,
+    /// Upper end of the interval.
+    pub high: f64,
 }
 
 /// A measured row: means over the cases that gave a curve, and the cases that did not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Column name and mean with its interval, or a median or fraction without one.
-    pub columns: Vec<(&'static str, Interval)>,
+    /// Column name and figure; empty if no case gave a curve.
+    pub columns: Vec<(&'static str, Figure)>,
     /// Cases that were scored.
     pub scored: usize,
     /// Case id and reason of each failure.
@@ -123,16 +134,16 @@ pub struct Table {
     pub rows: Vec<TableRow>,
 }
 
-/// Arc length between samples of the point-to-polyline scores, as a fraction of the truth's length.
-const SPACING_FRACTION: f64 = 1.0 / 4000.0;
+/// Arc length between samples of the point-to-polyline scores, in pixels at the truth's depth.
+const SPACING_PX: f64 = 0.5;
 
 /// Measures every row on every case; the same numbers for any number of threads.
 ///
 /// `on_case` is called when a case is done.
 ///
 /// # Errors
-/// [`Error::Synthesis`] if a case cannot be generated. A method that fails on a case is counted in
-/// its row, not an error here.
+/// [`Error::Synthesis`] if a case cannot be generated, [`Error::Scoring`] if a mean cannot be formed.
+/// A method that fails on a case is counted in its row, not an error here.
 pub fn measure(
     set: &CaseSet,
     rows: &[Row],
@@ -143,12 +154,14 @@ pub fn measure(
         .into_par_iter()
         .map(|index| {
             let pair = set.case(index)?;
-            let scores = runnable(rows).map(|(row, method)| score(&pair, row, method)).collect();
+            let scores =
+                runnable(rows).map(|(row, method)| score(&pair, row, method, kind)).collect();
             on_case();
             Ok((pair.rig.unit(), scores))
         })
         .collect::<Result<_, Error>>()?;
-    let mut measured = runnable(rows).enumerate().map(|(column, _)| {
+    let mut measured = Vec::new();
+    for column in 0..runnable(rows).count() {
         let (mut scored, mut failures) = (Vec::new(), Vec::new());
         for (_, scores) in &per_case {
             match &scores[column] {
@@ -156,8 +169,9 @@ pub fn measure(
                 Err(failure) => failures.push(failure.clone()),
             }
         }
-        Measured { columns: columns(kind, &scored), scored: scored.len(), failures }
-    });
+        measured.push(Measured { columns: columns(&scored)?, scored: scored.len(), failures });
+    }
+    let mut measured = measured.into_iter();
     let rows = rows
         .iter()
         .map(|row| TableRow {
@@ -183,65 +197,79 @@ fn runnable(rows: &[Row]) -> impl Iterator<Item = (&Row, crate::Method)> {
     })
 }
 
-fn score(pair: &ViewPair, row: &Row, method: crate::Method) -> Result<Scored, (String, String)> {
+fn score(
+    pair: &ViewPair,
+    row: &Row,
+    method: crate::Method,
+    kind: super::ScoreKind,
+) -> Result<Scored, (String, String)> {
     let fail = |reason: String| (pair.id.clone(), reason);
     let truth = pair.truth.as_deref().ok_or_else(|| fail("the pair has no truth".to_owned()))?;
     let params = Params::new(row.input, method);
     let reconstruction = reconstruct(pair, &params).map_err(|e| fail(e.to_string()))?;
     let curve = reconstruction.positions();
-    let spacing = length(truth) * SPACING_FRACTION;
-    Ok(Scored {
-        table: TableScores::of(&curve, truth).map_err(|e| fail(e.to_string()))?,
-        curve: CurveScores::of(&curve, truth, spacing).map_err(|e| fail(e.to_string()))?,
-        world_per_px: world_per_px(&pair.rig, truth),
-    })
-}
-
-fn length(points: &[Point3]) -> f64 {
-    points.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
+    let scored = match kind {
+        super::ScoreKind::Table => table_scores(&curve, truth).map(Scored::Table),
+        super::ScoreKind::Polyline => {
+            let unit_per_px = world_per_px(&pair.rig, truth);
+            curve_scores(&curve, truth, SPACING_PX * unit_per_px)
+                .map(|scores| Scored::Polyline(scores, unit_per_px))
+        }
+    };
+    scored.map_err(|e| fail(e.to_string()))
 }
 
 /// Depth of the truth's centre over the focal length, mean of both views.
 fn world_per_px(rig: &Rig, truth: &[Point3]) -> f64 {
     let centre = truth.iter().map(|p| p.coords).sum::<accurate_geom::nalgebra::Vector3<f64>>()
         / truth.len() as f64;
-    let one = |camera: &accurate_geom::Camera| {
-        camera.depth(&centre.into()) / camera.k()[(0, 0)].abs()
-    };
+    let one =
+        |camera: &accurate_geom::Camera| camera.depth(&centre.into()) / camera.k()[(0, 0)].abs();
     (one(rig.camera1()) + one(rig.camera2())) / 2.0
 }
 
 /// The Hausdorff distance below which a case counts as right, px.
 const RIGHT_PX: f64 = 5.0;
 
-fn columns(kind: super::ScoreKind, scored: &[Scored]) -> Vec<(&'static str, Interval)> {
-    if scored.is_empty() {
-        return Vec::new();
+fn columns(scored: &[Scored]) -> Result<Vec<(&'static str, Figure)>, EvalError> {
+    let table: Vec<TableScores> = scored
+        .iter()
+        .filter_map(|s| if let Scored::Table(t) = s { Some(*t) } else { None })
+        .collect();
+    if !table.is_empty() {
+        return Metric::ALL
+            .iter()
+            .map(|metric| {
+                let values: Vec<f64> = table.iter().map(|scores| metric.of(scores)).collect();
+                Ok((metric.heading(), mean(&values, metric.heading())?))
+            })
+            .collect();
     }
-    let mean = |name, value: fn(&Scored) -> f64| {
-        (name, bootstrap_mean(&scored.iter().map(value).collect::<Vec<_>>(), name))
+    let curve: Vec<(CurveScores, f64)> = scored
+        .iter()
+        .filter_map(|s| if let Scored::Polyline(c, px) = s { Some((*c, *px)) } else { None })
+        .collect();
+    if curve.is_empty() {
+        return Ok(Vec::new());
+    }
+    let overall: Vec<f64> = curve.iter().map(|(c, _)| c.overall).collect();
+    let hausdorff: Vec<f64> = curve.iter().map(|(c, _)| c.hausdorff).collect();
+    let hausdorff_px: Vec<f64> = curve.iter().map(|(c, px)| c.hausdorff / px).collect();
+    let point = |values: &[f64], probability| {
+        quantile(values, probability).map(|value| Figure { value, low: value, high: value })
     };
-    let point = |name, value: f64| (name, Interval { mean: value, low: value, high: value });
-    match kind {
-        super::ScoreKind::Table => vec![
-            mean("Acc", |s| s.table.accuracy),
-            mean("Comp", |s| s.table.completeness),
-            mean("Overall", |s| s.table.overall),
-            mean("Max Err", |s| s.table.max_error),
-        ],
-        super::ScoreKind::Polyline => {
-            let overall: Vec<f64> = scored.iter().map(|s| s.curve.overall).collect();
-            let hausdorff: Vec<f64> = scored.iter().map(|s| s.curve.hausdorff).collect();
-            vec![
-                mean("Overall", |s| s.curve.overall),
-                point("Overall median", quantile(&overall, 0.5)),
-                mean("Hausdorff", |s| s.curve.hausdorff),
-                point("Hausdorff median", quantile(&hausdorff, 0.5)),
-                point("Hausdorff p95", quantile(&hausdorff, 0.95)),
-                mean("share < 5 px", |s| {
-                    f64::from(u8::from(s.curve.hausdorff < RIGHT_PX * s.world_per_px))
-                }),
-            ]
-        }
-    }
+    let right = fraction_below(&hausdorff_px, RIGHT_PX)?;
+    Ok(vec![
+        ("Overall", mean(&overall, "Overall")?),
+        ("Overall median", point(&overall, 0.5)?),
+        ("Hausdorff", mean(&hausdorff, "Hausdorff")?),
+        ("Hausdorff median", point(&hausdorff, 0.5)?),
+        ("Hausdorff p95", point(&hausdorff, 0.95)?),
+        ("share < 5 px", Figure { value: right.fraction, low: right.low, high: right.high }),
+    ])
+}
+
+fn mean(values: &[f64], name: &str) -> Result<Figure, EvalError> {
+    let interval = bootstrap_mean(values, DEFAULT_RESAMPLES, name)?;
+    Ok(Figure { value: interval.mean, low: interval.low, high: interval.high })
 }

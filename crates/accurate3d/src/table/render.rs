@@ -2,7 +2,7 @@ use std::fmt;
 use std::fmt::Write;
 use std::str::FromStr;
 
-use accurate_eval::{Dataset, published};
+use accurate_eval::{Dataset, Metric, published};
 use serde_json::{Value, json};
 
 use super::measure::{Table, TableRow};
@@ -65,7 +65,8 @@ pub fn grid(table: &Table) -> (Vec<String>, Vec<Vec<String>>) {
     let columns = column_names(table);
     let mut header: Vec<String> =
         ["Method", "Input", "Calib."].iter().map(|s| (*s).to_owned()).collect();
-    let shows_paper = dataset_of(&table.set).is_some() && columns.contains(&"Acc");
+    let shows_paper =
+        dataset_of(&table.set).is_some() && columns.contains(&Metric::Accuracy.heading());
     for column in &columns {
         if shows_paper {
             header.push(format!("{column} (paper)"));
@@ -94,9 +95,14 @@ pub fn grid(table: &Table) -> (Vec<String>, Vec<Vec<String>>) {
                         || "-".to_owned(),
                         |(_, i)| {
                             if i.low == i.high {
-                                number(i.mean)
+                                number(i.value)
                             } else {
-                                format!("{} [{}, {}]", number(i.mean), number(i.low), number(i.high))
+                                format!(
+                                    "{} [{}, {}]",
+                                    number(i.value),
+                                    number(i.low),
+                                    number(i.high)
+                                )
                             }
                         },
                     ),
@@ -128,7 +134,8 @@ fn dataset_of(set: &str) -> Option<Dataset> {
 }
 
 fn paper_value(table: &Table, row: &TableRow, column: &str) -> Option<f64> {
-    published(row.row.published?, dataset_of(&table.set)?, column)
+    let metric = Metric::ALL.into_iter().find(|metric| metric.heading() == column)?;
+    Some(metric.of(&published(row.row.published?, dataset_of(&table.set)?)?.scores))
 }
 
 fn column_names(table: &Table) -> Vec<&'static str> {
@@ -179,7 +186,8 @@ fn markdown(table: &Table) -> String {
 }
 
 fn csv(table: &Table) -> String {
-    let mut text = String::from("set,cases,unit,label,input,metric,paper,mean,low,high,scored,failed,note\n");
+    let mut text =
+        String::from("set,cases,unit,label,input,metric,paper,value,low,high,scored,failed,note\n");
     for row in &table.rows {
         let lead = format!(
             "{},{},{},\"{}\",{}",
@@ -193,7 +201,7 @@ fn csv(table: &Table) -> String {
                     |(_, i)| {
                         format!(
                             "{},{},{},{},{},",
-                            i.mean,
+                            i.value,
                             i.low,
                             i.high,
                             m.scored,
@@ -247,7 +255,7 @@ fn to_json(table: &Table) -> Value {
                             let metric = json!({
                                 "metric": name,
                                 "paper": paper_value(table, row, name),
-                                "mean": i.mean, "low": i.low, "high": i.high,
+                                "value": i.value, "low": i.low, "high": i.high,
                             });
                             metric
                         })
