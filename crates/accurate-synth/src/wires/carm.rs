@@ -27,7 +27,9 @@ pub(super) fn draw(curve: &mut ChaCha8Rng, rig: &mut ChaCha8Rng) -> Result<Draft
 
     let diameter = if curve.random_bool(0.5) { 0.035 * 25.4 } else { 0.014 * 25.4 };
     let path = Path::draw(curve);
-    let mut points = path.integrate(direction(curve), direction(curve));
+    // Large vessels run along the patient, whom the C-arm circles: seldom along a line of sight.
+    let start = (Vector3::z() + direction(curve) * 0.8).normalize();
+    let mut points = path.integrate(start, direction(curve));
     let (low, high) = points.iter().fold((points[0].coords, points[0].coords), |(l, h), p| {
         (l.inf(&p.coords), h.sup(&p.coords))
     });
