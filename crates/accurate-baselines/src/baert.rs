@@ -76,7 +76,7 @@ impl CurveMatcher for Baert {
         if matches.is_empty() {
             return Err(MatchError::NoCorrespondence { method: Self::NAME, candidates });
         }
-        scene.points_along(Self::NAME, &matches, self.step_px)
+        scene.points_along(Self::NAME, &matches, samples[1])
     }
 }
 

@@ -1,4 +1,4 @@
-use accurate_geom::{EpipolarLine, Pixel, Rig, View1, View2};
+use accurate_geom::{Pixel, Rig, View1, View2};
 use accurate_match::{CurveMatcher, CurveReconstruction, MatchError, validate_curve};
 
 use crate::chain::longest_cheapest_chain;
@@ -88,7 +88,7 @@ impl CurveMatcher for Hoffmann {
             .chunk_by(|a, b| self.fill || b.0 == a.0 + 1)
             .map(|run| run.iter().map(|&(i, u2)| (samples[i], u2)).collect())
             .collect();
-        join(runs.iter().map(|run| scene.points_along(Self::NAME, run, self.step_px)))
+        join(runs.iter().map(|run| scene.points_along(Self::NAME, run, samples[1])))
     }
 }
 
@@ -102,7 +102,7 @@ impl Hoffmann {
             let Ok(line) = line_of.line(scene.track1.pixel(u1)) else { continue };
             let mut places = scene.track2.crossings(&line);
             if self.tangent_px > 0.0 {
-                places.extend(near_touches(scene.track2, &line, self.tangent_px));
+                places.extend(scene.track2.near_touches(self.tangent_px, &line));
                 places.sort_unstable_by(f64::total_cmp);
                 places.dedup();
             }
@@ -110,23 +110,6 @@ impl Hoffmann {
         }
         nodes
     }
-}
-
-/// Places where the track turns back before it reaches the line, at most `limit_px` from it.
-///
-/// A turning point beyond the line has a crossing on either side, and needs no help.
-fn near_touches(track: &Track<View2>, line: &EpipolarLine<View2>, limit_px: f64) -> Vec<f64> {
-    track
-        .turning_points(line)
-        .into_iter()
-        .filter(|&u| {
-            let value = line.signed_distance(track.pixel(u));
-            // Towards the line or away from it: a pixel to either side tells.
-            let beside = [u - limit_px, u + limit_px]
-                .map(|v| line.signed_distance(track.pixel(v.clamp(0.0, track.length_px()))));
-            value.abs() <= limit_px && beside.iter().all(|b| b * value.signum() >= value.abs())
-        })
-        .collect()
 }
 
 /// One curve of several pieces; a piece that cannot be triangulated only counts as dropped.

@@ -10,6 +10,8 @@ const MAX_SAMPLES: usize = 20_000;
 #[derive(Debug, Clone)]
 pub(crate) struct Track<V> {
     curve: Curve2,
+    /// Between two knots each; asking one of them is cheaper than asking the whole curve.
+    pieces: Vec<Piece>,
     /// Chord length at each input point that moves on, and which input point it is.
     places: Vec<(f64, usize)>,
     view: PhantomData<V>,
@@ -47,7 +49,8 @@ impl<V: View> Track<V> {
             distinct = with_midpoints(&distinct);
         }
         let curve = Curve2::smoothing(&distinct, sigma_px)?;
-        Ok(Self { curve, places, view: PhantomData })
+        let pieces = pieces(&curve)?;
+        Ok(Self { curve, pieces, places, view: PhantomData })
     }
 
     pub(crate) fn length_px(&self) -> f64 {
@@ -58,7 +61,7 @@ impl<V: View> Track<V> {
         self.curve.at(u).into()
     }
 
-    /// Evenly spaced places from end to end, `step_px` apart or somewhat less; farther apart only
+    /// At least two evenly spaced places from end to end, `step_px` apart or somewhat less; farther apart only
     /// where there would be more than `most`.
     pub(crate) fn samples(&self, step_px: f64, most: usize) -> Vec<f64> {
         let wanted = (self.length_px() / step_px).ceil();
@@ -70,13 +73,31 @@ impl<V: View> Track<V> {
     /// Places where the track meets the line, ascending.
     pub(crate) fn crossings(&self, line: &EpipolarLine<V>) -> Vec<f64> {
         let l = line.coefficients();
-        self.curve.intersect_line(l.x, l.y, l.z)
+        let near = self.pieces.iter().filter(|piece| piece.comes_within(0.0, line));
+        let mut found: Vec<f64> =
+            near.flat_map(|piece| piece.curve.intersect_line(l.x, l.y, l.z)).collect();
+        // A crossing at a knot belongs to both pieces.
+        found.dedup();
+        found
     }
 
-    /// Places where the distance to the line turns, ascending.
-    pub(crate) fn turning_points(&self, line: &EpipolarLine<V>) -> Vec<f64> {
+    /// Places, ascending, where the track turns back before it reaches the line, at most `within_px`
+    /// from it. A turning point beyond the line has a crossing on either side, and is none of these;
+    /// neither is one exactly at a knot.
+    pub(crate) fn near_touches(&self, within_px: f64, line: &EpipolarLine<V>) -> Vec<f64> {
         let l = line.coefficients();
-        self.curve.line_extrema(l.x, l.y, l.z)
+        let mut found = Vec::new();
+        for piece in self.pieces.iter().filter(|piece| piece.comes_within(within_px, line)) {
+            for u in piece.curve.line_extrema(l.x, l.y, l.z) {
+                let value = line.signed_distance(self.pixel(u));
+                let bend = self.curve.second_derivative(u);
+                let bends_away = (l.x * bend.x + l.y * bend.y) * value > 0.0;
+                if value.abs() <= within_px && bends_away {
+                    found.push(u);
+                }
+            }
+        }
+        found
     }
 
     /// Index of the input point nearest to `u` along the track.
@@ -86,6 +107,39 @@ impl<V: View> Track<V> {
         let (left, right) = (self.places[before], self.places[after]);
         if u - left.0 < right.0 - u { left.1 } else { right.1 }
     }
+}
+
+/// One polynomial piece in Bézier form.
+#[derive(Debug, Clone)]
+struct Piece {
+    curve: Curve2,
+    hull: [Point2; 4],
+}
+
+impl Piece {
+    /// Whether the hull, which holds the piece, comes within `px` of the line.
+    fn comes_within<V: View>(&self, px: f64, line: &EpipolarLine<V>) -> bool {
+        let values = self.hull.map(|p| line.signed_distance(p.into()));
+        // Written so that a value that is not a number lets the piece pass: the curve decides.
+        !(values.iter().all(|v| *v > px) || values.iter().all(|v| *v < -px))
+    }
+}
+
+fn pieces(curve: &Curve2) -> Result<Vec<Piece>, GeomError> {
+    let ends = curve.breakpoints();
+    let mut pieces = Vec::with_capacity(ends.len());
+    let mut jet = curve.jet(ends[0]);
+    for pair in ends.windows(2) {
+        let third = (pair[1] - pair[0]) / 3.0;
+        let next = curve.jet(pair[1]);
+        let inner = [jet.point + jet.first * third, next.point - next.first * third];
+        let hull = [jet.point, inner[0], inner[1], next.point];
+        let mut knots = vec![pair[0]; 4];
+        knots.extend([pair[1]; 4]);
+        pieces.push(Piece { curve: Curve2::new(knots, hull.to_vec())?, hull });
+        jet = next;
+    }
+    Ok(pieces)
 }
 
 fn with_midpoints(points: &[Point2]) -> Vec<Point2> {
@@ -101,7 +155,8 @@ fn with_midpoints(points: &[Point2]) -> Vec<Point2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use accurate_geom::View1;
+    use accurate_geom::nalgebra::Matrix3;
+    use accurate_geom::{Fundamental, View1, View2};
     use proptest::prelude::*;
 
     fn pixels(points: &[(f64, f64)]) -> Vec<Pixel<View1>> {
@@ -130,6 +185,42 @@ mod tests {
                 prop_assert_eq!(track.nearest_input(place), index);
             }
         }
+    }
+
+    proptest! {
+        #[test]
+        fn pieces_cross_a_line_where_the_whole_curve_does(
+            points in prop::collection::vec((0.0..50.0f64, 0.0..50.0f64), 2..20),
+            level in 0.0..50.0f64,
+        ) {
+            let track = Track::new(&pixels(&points), 0.0).unwrap();
+            let f = Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0);
+            let f = Fundamental::<View1, View2>::from_matrix(f).unwrap();
+            let line = f.line(Pixel::new(0.0, level)).unwrap();
+            let l = line.coefficients();
+            let whole = track.curve.intersect_line(l.x, l.y, l.z);
+            let found = track.crossings(&line);
+            prop_assert_eq!(found.len(), whole.len());
+            for u in found {
+                // Near a double root the place is the square root of the value's rounding.
+                prop_assert!(line.distance(track.pixel(u)) < 1e-9);
+            }
+            for u in track.near_touches(0.5, &line) {
+                prop_assert!(line.distance(track.pixel(u)) <= 0.5);
+            }
+        }
+    }
+
+    #[test]
+    fn a_touch_short_of_the_line_is_near_and_one_beyond_it_is_not() {
+        // The vertex lies between two points: at a knot it would belong to neither piece.
+        let arch: Vec<_> =
+            (-20..=20).map(|x| f64::from(x) + 0.3).map(|x| (x, 0.1 * x * x)).collect();
+        let track = Track::new(&pixels(&arch), 0.0).unwrap();
+        let f = Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0);
+        let f = Fundamental::<View1, View2>::from_matrix(f).unwrap();
+        let touches = |y: f64| track.near_touches(0.5, &f.line(Pixel::new(0.0, y)).unwrap()).len();
+        assert_eq!([touches(-0.4), touches(-0.6), touches(0.4)], [1, 0, 0]);
     }
 
     #[test]

@@ -45,7 +45,7 @@ fn quick(name: &str) -> Box<dyn CurveMatcher> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn every_method_gives_finite_points_or_an_error(

@@ -19,12 +19,9 @@ fn worst(matcher: &dyn CurveMatcher, angle: f64, curve: fn(f64) -> Point3, lengt
     let (a, b) = images(&rig, &sampled((length * 10.0) as usize, curve));
     let found = matcher.reconstruct(&a, &b, &rig).unwrap();
     assert_eq!(found.dropped, 0);
-    assert!(
-        found.points.len() + 20 > a.len().min(b.len()),
-        "{} of {}",
-        found.points.len(),
-        a.len()
-    );
+    // A point per px of view 1, but for some at the tips that see no crossing.
+    let length_px: f64 = a.windows(2).map(|w| w[0].distance(w[1])).sum();
+    assert!(found.points.len() as f64 > length_px - 5.0, "{} of {length_px}", found.points.len());
     let truth = sampled((length * 200.0) as usize, curve);
     // Every 7th point keeps the quadratic search quick.
     let thinned = found.points.iter().step_by(7);
@@ -41,7 +38,7 @@ fn exact() -> [Box<dyn CurveMatcher>; 2] {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(4))]
+    #![proptest_config(ProptestConfig { cases: 4, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn a_straight_line_is_reconstructed(angle in 25.0..80.0f64) {
