@@ -41,12 +41,22 @@ impl View for View2 {
 
 /// A sub-pixel position in the image of view `V`: x right, y down, px, pixel centres at integers.
 ///
-/// The view is part of the type, so that a pixel of one view cannot be handed in for the other:
+/// The view is part of the type, so that a pixel of one view cannot be handed in for the other.
+/// The line in view 1 takes a pixel of view 2:
 ///
-/// ```compile_fail
-/// use accurate_geom::{Pixel, View1, View2, Fundamental};
+/// ```
+/// use accurate_geom::{Fundamental, Pixel, View1, View2};
+/// fn right_way_round(f: &Fundamental<View1, View2>, p2: Pixel<View2>) {
+///     let _ = f.line(p2);
+/// }
+/// ```
+///
+/// and refuses one of view 1. All else is as above:
+///
+/// ```compile_fail,E0308
+/// use accurate_geom::{Fundamental, Pixel, View1, View2};
 /// fn swapped(f: &Fundamental<View1, View2>, p1: Pixel<View1>) {
-///     let _ = f.line(p1); // the line in view 1 needs a pixel of view 2
+///     let _ = f.line(p1);
 /// }
 /// ```
 #[derive(Clone, Copy, PartialEq)]

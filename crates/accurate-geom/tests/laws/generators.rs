@@ -96,3 +96,39 @@ pub fn projection_rounding_px(camera: &Camera, x: &Point3) -> f64 {
     let in_camera = x.coords.norm() + camera.t().norm();
     10.0 * f64::EPSILON * k.amax() * (1.0 + in_camera / camera.depth(x))
 }
+
+/// The geometry of a C-arm that turned by 33.3 degrees, with f_y < 0, and tilted a little.
+pub fn turntable_rig() -> Rig {
+    let k = Matrix3::new(1493.75, 0.0, 250.0, 0.0, -1493.75, 250.0, 0.0, 0.0, 1.0);
+    let size = ImageSize { width: 500, height: 500 };
+    let upright = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0);
+    let camera = |degrees: f64, tilt: f64| {
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), degrees.to_radians())
+            * Rotation3::from_axis_angle(&Vector3::x_axis(), tilt);
+        let r = upright * turn.into_inner();
+        Camera::new(k, r, Vector3::new(0.0, 0.0, 720.0), size).unwrap()
+    };
+    Rig::new(camera(-27.2, 0.0), camera(6.1, 0.2), LengthUnit::Millimetre).unwrap()
+}
+
+/// Points of a wandering curve: steps of length 0.5 to 2 that turn by at most 0.5 radians in the
+/// plane, with a bounded third coordinate where there is one.
+pub fn wandering<const D: usize>(
+    count: std::ops::Range<usize>,
+) -> impl Strategy<Value = Vec<accurate_geom::nalgebra::Point<f64, D>>> {
+    proptest::collection::vec((0.5..2.0f64, -0.5..0.5f64, -0.3..0.3f64), count).prop_map(|steps| {
+        let mut p = accurate_geom::nalgebra::Point::<f64, D>::origin();
+        let mut direction = 0.3f64;
+        let mut points = vec![p];
+        for (length, turn, rise) in steps {
+            direction += turn;
+            p[0] += length * direction.cos();
+            p[1] += length * direction.sin();
+            if D > 2 {
+                p[2] += length * rise;
+            }
+            points.push(p);
+        }
+        points
+    })
+}
