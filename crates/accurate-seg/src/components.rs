@@ -121,6 +121,14 @@ mod tests {
     }
 
     #[test]
+    fn an_image_beyond_the_indices_of_imageproc_is_refused() {
+        for side in [1 << 16, usize::MAX] {
+            let error = to_image(side, side, std::iter::empty()).unwrap_err();
+            assert_eq!(error, SegError::TooLarge { height: side, width: side });
+        }
+    }
+
+    #[test]
     fn a_mask_of_a_single_pixel_is_one_component() {
         assert_eq!(Components::of(&mask(&["#"])).unwrap().sizes(), [1]);
         assert_eq!(keep_largest(&mask(&["#"])).unwrap(), mask(&["#"]));

@@ -102,11 +102,9 @@ impl Skeleton {
     /// Joins by a straight line of pixels every two endpoints that do not touch and are at most
     /// `max_gap_px` apart in rows and in columns, then thins the result.
     ///
-    /// With `max_gap_px` of 1, as published, there is nothing to join and nothing changes. Larger
-    /// values also join the two ends of one strand.
-    ///
-    /// # Source
-    /// ACCURATE, preparation of the masks before the traversal.
+    /// With `max_gap_px` of 1, the value behind the published numbers of ACCURATE (whose text does
+    /// not mention the step), there is nothing to join and nothing changes. Larger values also join
+    /// the two ends of one strand.
     ///
     /// # Cost
     /// Pairs of endpoints within `max_gap_px` rows of each other.
