@@ -1,6 +1,8 @@
 //! Rigs and pairs for the tests, made from a number alone.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+pub mod files;
+
 use accurate_geom::nalgebra::{Matrix3, Rotation3, Vector3};
 use accurate_geom::{Camera, ImageSize, LengthUnit, Pixel, Point3, Rig};
 use accurate_io::{BitDepth, GreyImage, PairContents};
