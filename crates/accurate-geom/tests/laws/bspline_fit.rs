@@ -107,9 +107,11 @@ proptest! {
         let (fine, coarse) = (
             Curve2::smoothing(&points, sigma).unwrap(), Curve2::smoothing(&points, 2.0 * sigma).unwrap(),
         );
+        prop_assert!(coarse.knots().len() <= fine.knots().len());
         // Comparable only over the same knots.
-        prop_assume!(fine.knots() == coarse.knots());
-        prop_assert!(bending(&coarse) <= bending(&fine) * (1.0 + 1e-4) + 1e-12);
+        if coarse.knots() == fine.knots() {
+            prop_assert!(bending(&coarse) <= bending(&fine) * (1.0 + 1e-4) + 1e-12);
+        }
     }
 }
 

@@ -26,9 +26,10 @@ fn lenses(radial: f64, tangential: f64) -> impl Strategy<Value = Distortion> {
 proptest! {
     #[test]
     fn undistort_inverts_distort(
-        k in intrinsics(), lens in lenses(0.08, 0.01), x in -0.8..0.8f64, y in -0.8..0.8f64,
+        k in intrinsics(), lens in lenses(0.02, 0.005), x in -0.8..0.8f64, y in -0.8..0.8f64,
     ) {
-        // At r² <= 1.28 these lenses change the radius by less than a third and never fold.
+        // At r² <= 1.28 the slope of the radius is above 1 - 0.02 (3 r² + 5 r⁴ + 7 r⁶) = 0.47, less
+        // 0.05 for the tangential terms: these lenses never fold.
         let camera = camera(k, lens);
         let ideal = Point2::from((k * Vector3::new(x, y, 1.0)).xy());
         let distorted = camera.distort(&ideal).unwrap();
