@@ -28,8 +28,7 @@ pub struct CurveScores {
     /// The larger of the two one-sided 95th percentiles.
     pub percentile_95: f64,
     /// Discrete Fréchet (coupling) distance of the samples, in that direction of the reconstruction
-    /// which gives the smaller value. At most half a spacing above the continuous distance on either
-    /// curve.
+    /// which gives the smaller value. At most one spacing above the continuous distance.
     pub frechet: f64,
     /// Whether that is the direction opposite to the one given.
     pub frechet_reversed: bool,

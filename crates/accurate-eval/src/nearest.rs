@@ -112,6 +112,16 @@ mod tests {
         }
 
         #[test]
+        fn the_polyline_is_never_farther_than_its_vertices(
+            vertices in prop::collection::vec(point(), 1..40), query in point(),
+        ) {
+            let to_line = PolylineIndex::new(&vertices).distance(query);
+            let to_points = PointIndex::new(vertices.into_iter()).distance(query);
+            // Inside a segment the offset is rounded once more, at coordinates below 100.
+            prop_assert!(to_line <= to_points + 4.0 * f64::EPSILON * 100.0);
+        }
+
+        #[test]
         fn the_nearest_segment_equals_brute_force(
             vertices in prop::collection::vec(point(), 1..60), query in point(),
         ) {
