@@ -35,7 +35,7 @@ fn main() -> Result<(), EvalError> {
 
     let mut cases: Vec<Case> = (0..12)
         .map(|k| {
-            let found = helix(3000, 0.2, f64::from(k));
+            let found = helix(3000, 0.1 + 0.02 * f64::from(k), f64::from(k));
             Ok(Case {
                 name: format!("helix_{k:02}"),
                 outcome: CaseOutcome::Scored(table_scores(&found, &truth)?),
