@@ -44,7 +44,7 @@ pub struct Baur {
     pub curvature_weight_px3: f64,
     /// Length of the device, if it is known and all of it is seen.
     pub known_length: Option<KnownLength>,
-    /// Distance of the points returned, in the rig's unit; `None` for as many as pairs were matched.
+    /// Distance of the points returned, in the rig's unit; `None` for about a point per image px.
     pub output_step: Option<f64>,
     /// Iterations after which the fit counts as failed.
     pub max_iterations: usize,
@@ -194,7 +194,11 @@ impl Baur {
         let length = fit.spline.length();
         let count = match self.output_step {
             Some(step) => ((length / step).round() as usize).clamp(1, MAX_OUTPUT) + 1,
-            None => observations.len(),
+            None => {
+                (fit.spline.width * fit.spline.spans() as f64).clamp(1.0, MAX_OUTPUT as f64)
+                    as usize
+                    + 1
+            }
         };
         let along = |of: fn(&Observation) -> f64| {
             let knots: Vec<_> = observations.iter().map(|o| (o.t, of(o))).collect();
