@@ -215,7 +215,6 @@ fn pairs_that_cannot_be_triangulated_are_counted_or_reported() {
         pixel1: at_infinity(rig.camera1()).into(),
         pixel2: at_infinity(rig.camera2()).into(),
     };
-    // A pair that meets behind the cameras: mirror the images of a far point.
     let run = |pairs: &[PixelPair]| triangulate_pairs("test", &rig, Triangulation::Dlt, pairs);
     let found = run(&[parallel, good]).unwrap();
     assert_eq!((found.points.len(), found.dropped, found.pairs), (1, 1, vec![(4, 5)]));
