@@ -10,6 +10,10 @@ use crate::{curve_csv, npy, ply, vtp};
 /// The extensions [`read_curve`] and [`write_curve`] know.
 const EXTENSIONS: &str = ".csv, .ply, .vtp, .npy";
 
+/// Most columns a curve may have. Names are compared with one another, so that a file of a million
+/// columns would take hours.
+const MAX_COLUMNS: usize = 1024;
+
 /// A 3D curve with values per point, as it goes to and comes from a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CurveTable {
@@ -17,7 +21,7 @@ pub struct CurveTable {
     pub unit: LengthUnit,
     /// Points in order along the curve; at least one.
     pub points: Vec<Point3>,
-    /// Values per point: arc length, sigma, residual, flags, ...
+    /// Values per point: arc length, sigma, residual, flags, ...; at most 1024.
     pub columns: Vec<Column>,
 }
 
@@ -54,6 +58,7 @@ impl CurveTable {
                 finite(path, *value, || format!("{name} of point {i}"))?;
             }
         }
+        check_column_count(path, self.columns.len())?;
         let mut names = BTreeSet::from(["x", "y", "z"]);
         for Column { name, unit, values } in &self.columns {
             let bad = |value: &str, reason: &str| IoError::field(path, "column", value, reason);
@@ -129,6 +134,19 @@ pub fn read_curve(path: &Path) -> Result<CurveTable, IoError> {
     Ok(curve)
 }
 
+/// Refuses more columns than [`MAX_COLUMNS`]; readers ask before they compare names.
+pub(crate) fn check_column_count(path: &Path, found: usize) -> Result<(), IoError> {
+    if found <= MAX_COLUMNS {
+        return Ok(());
+    }
+    Err(IoError::TooLarge {
+        path: path.to_owned(),
+        what: "number of columns".into(),
+        found: found as u64,
+        limit: MAX_COLUMNS as u64,
+    })
+}
+
 fn extension(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
@@ -173,6 +191,7 @@ mod tests {
         with(|t| t.columns[0].name = String::new(), "expected a letter");
         with(|t| t.columns[0].unit = "m\nm".into(), "one trimmed line");
         with(|t| t.columns.push(t.columns[0].clone()), "the name is taken");
+        with(|t| t.columns = vec![t.columns[0].clone(); 1025], "number of columns is 1025");
         for extension in ["csv", "ply", "vtp", "npy"] {
             let path = folder.path().join(format!("curve.{extension}"));
             for (table, expected) in &bad {

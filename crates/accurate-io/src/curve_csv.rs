@@ -4,7 +4,7 @@ use accurate_geom::{LengthUnit, Point3};
 
 use crate::IoError;
 use crate::atomic::write_atomically;
-use crate::curve::{Column, CurveTable};
+use crate::curve::{Column, CurveTable, check_column_count};
 use crate::matrix::parse_number;
 use crate::points::CsvTable;
 
@@ -13,6 +13,7 @@ const ARC_LENGTH: &str = "arc_length";
 
 pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
     let table = CsvTable::read(path)?;
+    check_column_count(path, table.header.len().saturating_sub(3))?;
     let xyz = [table.column("x")?, table.column("y")?, table.column("z")?];
     let mut columns: Vec<(usize, Column)> = Vec::new();
     for (index, title) in table.header.iter().enumerate().filter(|(i, _)| !xyz.contains(i)) {

@@ -11,7 +11,7 @@ use ply_rs_bw::ply::{
 use crate::IoError;
 use crate::atomic::write_atomically;
 use crate::bounded::{MAX_POINTS_BYTES, read_bytes};
-use crate::curve::{Column, CurveTable};
+use crate::curve::{Column, CurveTable, check_column_count};
 use crate::matrix::{finite, parse_number};
 
 /// How numbers are stored in a PLY file.
@@ -141,6 +141,7 @@ fn parse(path: &Path) -> Result<(Vec<Point3>, Rest), IoError> {
         .find(|(name, _)| name.as_str() == "vertex")
         .map(|(_, element)| element)
         .ok_or_else(|| malformed(None, &"no element `vertex`"))?;
+    check_column_count(path, vertex.properties.len().saturating_sub(3))?;
     let scalars: Vec<&str> = vertex
         .properties
         .iter()

@@ -8,7 +8,7 @@ use quick_xml::events::{BytesStart, Event};
 use crate::IoError;
 use crate::atomic::write_atomically;
 use crate::bounded::{MAX_POINTS_BYTES, read_text};
-use crate::curve::{Column, CurveTable};
+use crate::curve::{Column, CurveTable, check_column_count};
 use crate::matrix::parse_number;
 
 /// Field array with the unit of the points.
@@ -95,6 +95,8 @@ struct Document<'a> {
     connectivity: Option<Vec<f64>>,
     offsets: Option<Vec<f64>>,
     texts: Vec<(String, String)>,
+    /// A byte offset and the line, from 1, it is in.
+    counted: (usize, usize),
 }
 
 /// An array whose content comes next.
@@ -116,6 +118,7 @@ impl<'a> Document<'a> {
             connectivity: None,
             offsets: None,
             texts: Vec::new(),
+            counted: (0, 1),
         }
     }
 
@@ -123,10 +126,14 @@ impl<'a> Document<'a> {
         IoError::malformed(self.path, "VTP", Some(line), reason)
     }
 
-    /// Line, from 1, of a byte offset.
-    fn line(&self, offset: u64) -> usize {
-        let offset = usize::try_from(offset).unwrap_or(usize::MAX).min(self.text.len());
-        1 + self.text.as_bytes().iter().take(offset).filter(|b| **b == b'\n').count()
+    /// Line, from 1, of a byte offset. Offsets must not decrease: counting goes on from the last
+    /// one, or a file of many small arrays would take quadratic time.
+    fn line(&mut self, offset: u64) -> usize {
+        let (from, line) = self.counted;
+        let to = usize::try_from(offset).unwrap_or(usize::MAX).min(self.text.len()).max(from);
+        let passed = self.text.as_bytes().get(from..to).unwrap_or_default();
+        self.counted = (to, line + passed.iter().filter(|b| **b == b'\n').count());
+        self.counted.1
     }
 
     fn parse(&mut self) -> Result<(), IoError> {
@@ -136,12 +143,12 @@ impl<'a> Document<'a> {
         let mut pieces = 0;
         loop {
             let event = reader.read_event();
-            let offset = reader.buffer_position();
-            match event.map_err(|e| self.malformed(self.line(offset), e))? {
+            let line = self.line(reader.buffer_position());
+            match event.map_err(|e| self.malformed(line, e))? {
                 Event::Start(tag) => {
                     let name = tag.name().as_ref().to_owned();
                     if open.is_empty() {
-                        self.check_root(&tag, &name, self.line(offset))?;
+                        self.check_root(&tag, &name, line)?;
                     }
                     if name == "Piece" {
                         pieces += 1;
@@ -149,9 +156,9 @@ impl<'a> Document<'a> {
                             return Err(self.unsupported("more than one piece"));
                         }
                     }
-                    if matches!(name.as_str(), "DataArray" | "Array") {
+                    if is_array(&name) {
                         let section = open.last().cloned().unwrap_or_default();
-                        pending = Some(self.array(&tag, section, self.line(offset))?);
+                        pending = Some(self.array(&tag, section, line)?);
                     }
                     open.push(name);
                     if open.len() > 16 {
@@ -160,14 +167,16 @@ impl<'a> Document<'a> {
                 }
                 Event::End(_) => {
                     if let Some(name) = open.pop()
-                        && matches!(name.as_str(), "DataArray" | "Array")
+                        && is_array(&name)
                         && let Some(array) = pending.take()
                     {
                         self.store(array)?;
                     }
                 }
                 Event::Text(content) => {
-                    if let Some(array) = &mut pending {
+                    // VTK nests information keys, which hold numbers too, within its arrays.
+                    let direct = open.last().is_some_and(|name| is_array(name));
+                    if let Some(array) = pending.as_mut().filter(|_| direct) {
                         array.content.push_str(&content.into_inner());
                     }
                 }
@@ -176,9 +185,7 @@ impl<'a> Document<'a> {
                 }
                 Event::Eof if open.is_empty() => return Ok(()),
                 Event::Eof => {
-                    return Err(
-                        self.malformed(self.line(offset), "the file ends within an element")
-                    );
+                    return Err(self.malformed(line, "the file ends within an element"));
                 }
                 Event::Empty(_) | Event::Comment(_) | Event::Decl(_) | Event::PI(_) => {}
             }
@@ -249,12 +256,9 @@ impl<'a> Document<'a> {
                 self.columns.push(Column { name: array.name, unit: String::new(), values });
             }
             ("FieldData", _) if array.is_text => {
-                let bytes: Vec<u8> = values
-                    .iter()
-                    .take_while(|v| **v != 0.0)
-                    .filter(|v| (1.0..256.0).contains(*v))
-                    .map(|v| *v as u8)
-                    .collect();
+                // VTK takes bytes for signed when it saves a text.
+                let byte = |v: &f64| if *v < 0.0 { (*v + 256.0) as u8 } else { *v as u8 };
+                let bytes = values.iter().take_while(|v| **v != 0.0).map(byte).collect();
                 let text = String::from_utf8(bytes)
                     .map_err(|_| self.malformed(array.line, "a text that is not UTF-8"))?;
                 self.texts.push((array.name, text));
@@ -265,6 +269,7 @@ impl<'a> Document<'a> {
     }
 
     fn into_curve(mut self) -> Result<CurveTable, IoError> {
+        check_column_count(self.path, self.columns.len().max(self.texts.len()))?;
         let values = self.points.take().unwrap_or_default();
         let n = values.len() / 3;
         if !values.len().is_multiple_of(3) {
@@ -289,5 +294,102 @@ impl<'a> Document<'a> {
             }
         }
         Ok(CurveTable { unit, points, columns: self.columns })
+    }
+}
+
+fn is_array(element: &str) -> bool {
+    matches!(element, "DataArray" | "Array")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As VTK saves a file of ours again: indented, with empty sections, information keys and signed
+    /// bytes.
+    const BY_VTK: &str = r#"<?xml version="1.0"?>
+<VTKFile type="PolyData" version="0.1" byte_order="LittleEndian" header_type="UInt32" compressor="vtkZLibDataCompressor">
+  <PolyData>
+    <FieldData>
+      <Array type="String" Name="unit" NumberOfTuples="1" format="ascii">
+        99 109 0
+      </Array>
+      <Array type="String" Name="unit:sigma" NumberOfTuples="1" format="ascii">
+        -62 -75 109 0
+      </Array>
+    </FieldData>
+    <Piece NumberOfPoints="2" NumberOfVerts="0" NumberOfLines="1" NumberOfStrips="0" NumberOfPolys="0">
+      <PointData>
+        <DataArray type="Float64" Name="sigma" format="ascii" RangeMin="0.5" RangeMax="1">
+          0.5 1
+        </DataArray>
+      </PointData>
+      <CellData>
+      </CellData>
+      <Points>
+        <DataArray type="Float64" Name="Points" NumberOfComponents="3" format="ascii" RangeMin="0" RangeMax="9">
+          0 1 2 -3
+          4 5e-1
+          <InformationKey name="L2_NORM_RANGE" location="vtkDataArray" length="2">
+            <InformationKeyValue index="0">
+              2.23
+            </InformationKeyValue>
+          </InformationKey>
+        </DataArray>
+      </Points>
+      <Verts>
+        <DataArray type="Int64" Name="connectivity" format="ascii"/>
+        <DataArray type="Int64" Name="offsets" format="ascii"/>
+      </Verts>
+      <Lines>
+        <DataArray type="Int64" Name="connectivity" format="ascii">
+          0 1
+        </DataArray>
+        <DataArray type="Int64" Name="offsets" format="ascii">
+          2
+        </DataArray>
+      </Lines>
+    </Piece>
+  </PolyData>
+</VTKFile>
+"#;
+
+    fn read_text(text: &str) -> Result<CurveTable, IoError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("curve.vtp");
+        std::fs::write(&path, text).unwrap();
+        read(&path)
+    }
+
+    #[test]
+    fn a_file_saved_again_by_vtk_is_read() {
+        let curve = read_text(BY_VTK).unwrap();
+        assert_eq!(curve.points, [Point3::new(0.0, 1.0, 2.0), Point3::new(-3.0, 4.0, 0.5)]);
+        assert_eq!(curve.unit, LengthUnit::Centimetre);
+        let sigma = Column { name: "sigma".into(), unit: "\u{b5}m".into(), values: vec![0.5, 1.0] };
+        assert_eq!(curve.columns, [sigma]);
+    }
+
+    #[test]
+    fn what_is_not_one_ascii_polyline_is_refused() {
+        for (from, to, expected) in [
+            ("0 1\n        </", "1 0\n        </", "lines other than one"),
+            ("          2\n", "          1 2\n", "lines other than one"),
+            (
+                "format=\"ascii\" RangeMin=\"0.5\"",
+                "format=\"appended\"",
+                "arrays that are not ASCII",
+            ),
+            ("\"PolyData\"", "\"ImageData\"", "line 2: not valid VTP: expected <VTKFile"),
+            ("NumberOfComponents=\"3\"", "NumberOfComponents=\"2\"", "2 components in Points"),
+            ("4 5e-1", "4 5e-1 6", "7 coordinates"),
+            ("4 5e-1", "4 NaN", "line 23, column 2 is not finite"),
+            ("</Points>", "</Point>", "not valid VTP"),
+            ("<PolyData>", "<!DOCTYPE a [<!ENTITY b \"c\">]><PolyData>", "entities"),
+        ] {
+            assert!(BY_VTK.contains(from), "{from}");
+            let error = read_text(&BY_VTK.replacen(from, to, 1)).unwrap_err().to_string();
+            assert!(error.contains(expected), "{from}: {error}");
+        }
     }
 }

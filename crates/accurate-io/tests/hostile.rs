@@ -236,6 +236,33 @@ fn a_line_without_end_is_one_bad_number() {
     assert!(error.to_string().len() < 300);
 }
 
+#[test]
+fn many_small_pieces_take_no_quadratic_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let n = 200_000;
+    let array = "<DataArray type=\"Float64\" Name=\"a\" format=\"ascii\">1</DataArray>\n";
+    let vtp = format!("<VTKFile type=\"PolyData\"><PointData>{}", array.repeat(n));
+    let properties: String = (0..n).map(|i| format!("property uchar p{i}\n")).collect();
+    let ply = format!("ply\nformat ascii 1.0\nelement vertex 1\n{properties}end_header\n");
+    let elements: String = (0..n).map(|i| format!("element e{i} 0\n")).collect();
+    let csv: String = (0..n).map(|i| format!("c{i},")).collect();
+    let table: [(&str, String, Read); 5] = [
+        ("a.vtp", vtp, curve),
+        ("b.ply", ply, curve),
+        ("c.ply", format!("ply\nformat ascii 1.0\n{elements}end_header\n"), curve),
+        ("d.csv", format!("x,y,z,{csv}\n"), curve),
+        ("e.csv", "x,y\n".to_owned() + &"1,2\n".repeat(n), points),
+    ];
+    for (name, text, read) in table {
+        let start = std::time::Instant::now();
+        survives(&folder.path().join(name), text.as_bytes(), read, name);
+        let seconds = start.elapsed().as_secs_f64();
+        println!("{name}: {} KiB in {seconds:.3} s", text.len() >> 10);
+        // Linear work takes milliseconds; 200 000 squared would take minutes.
+        assert!(seconds < 10.0, "{name}: {seconds} s");
+    }
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_device_that_never_ends_is_refused() {
