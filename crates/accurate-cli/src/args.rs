@@ -109,6 +109,9 @@ pub struct SynthArgs {
     /// How many cases.
     #[arg(short = 'n', long, default_value_t = 10)]
     pub count: u64,
+    /// Index of the first case; the case of an index is the same whatever else is generated.
+    #[arg(long, default_value_t = 0, value_name = "INDEX")]
+    pub first: u64,
     /// Seed of the family's named random streams.
     #[arg(short, long, default_value_t = 0)]
     pub seed: u64,

@@ -4,31 +4,39 @@ use std::path::{Path, PathBuf};
 
 use crate::IoError;
 
-/// The pair folders `path` stands for: the `case_*` folders in it, in natural order (`case_2`
-/// before `case_10`), or `path` itself if it is a pair folder.
+/// The pair folders `path` stands for: `path` itself if it is a pair folder, else the folders in it
+/// that are (or are called `case_*`), in natural order (`case_2` before `case_10`).
 ///
 /// # Errors
 /// [`IoError::Missing`] or [`IoError::System`] if the folder cannot be listed;
 /// [`IoError::NoPair`] if it is neither.
 pub fn find_pairs(path: &Path) -> Result<Vec<PathBuf>, IoError> {
     let system = |e| IoError::system(path, "list", e);
-    let mut cases = Vec::new();
-    for entry in fs::read_dir(path).map_err(system)? {
-        let entry = entry.map_err(system)?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if name.starts_with("case_") && entry.path().is_dir() {
-            cases.push((name, entry.path()));
-        }
-    }
-    if !cases.is_empty() {
-        cases.sort_by(|a, b| natural_order(&a.0, &b.0));
-        return Ok(cases.into_iter().map(|c| c.1).collect());
-    }
-    let marks = ["meta.json", "points", "masks", "images", "calibration/RT_L.txt"];
-    if marks.iter().any(|mark| path.join(mark).exists()) {
+    let entries = fs::read_dir(path).map_err(system)?;
+    if is_pair(path) {
         return Ok(vec![path.to_owned()]);
     }
-    Err(IoError::NoPair { path: path.to_owned() })
+    let mut cases = Vec::new();
+    for entry in entries {
+        let entry = entry.map_err(system)?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let folder = entry.path();
+        if folder.is_dir() && (name.starts_with("case_") || is_pair(&folder)) {
+            cases.push((name, folder));
+        }
+    }
+    if cases.is_empty() {
+        return Err(IoError::NoPair { path: path.to_owned() });
+    }
+    cases.sort_by(|a, b| natural_order(&a.0, &b.0));
+    Ok(cases.into_iter().map(|c| c.1).collect())
+}
+
+/// Whether the folder has what only a pair folder has. A set's folder may have a `calibration`
+/// folder of its own, with the K that its cases share.
+fn is_pair(folder: &Path) -> bool {
+    let marks = ["meta.json", "points", "masks", "images", "calibration/RT_L.txt"];
+    marks.iter().any(|mark| folder.join(mark).exists())
 }
 
 /// Compares names with runs of digits taken as numbers of any length.

@@ -17,6 +17,8 @@ pub struct Diagnostics {
     pub trace_jumps: [usize; 2],
     /// Fraction of each view's ordered points that found a partner.
     pub matched_fraction: [f64; 2],
+    /// Whether the points of view 2 were given against those of view 1, and turned round.
+    pub view2_reversed: bool,
     /// Matched pairs whose rays gave no finite point.
     pub dropped_pairs: usize,
 }
@@ -42,6 +44,7 @@ impl Diagnostics {
                 fraction(first, traces.points1.len()),
                 fraction(second, traces.points2.len()),
             ],
+            view2_reversed: traces.view2_reversed,
             dropped_pairs: matched.dropped,
         }
     }

@@ -18,6 +18,7 @@ pub use accurate_synth as synth;
 pub use accurate_traverse as traverse;
 
 mod diagnostics;
+mod direction;
 mod error;
 mod method;
 mod pair;

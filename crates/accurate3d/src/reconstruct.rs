@@ -3,6 +3,7 @@ use accurate_seg::{Mask, Skeleton, zhang_suen};
 use accurate_traverse::{TraverseParams, trace_pair};
 use ndarray::Array2;
 
+use crate::direction::runs_against;
 use crate::{Diagnostics, Error, InputKind, Method, Reconstruction, Traces, ViewPair};
 
 /// What to do with a pair.
@@ -25,8 +26,8 @@ impl Params {
 
 /// Reconstructs the 3D curve seen in both views of a pair.
 ///
-/// Masks are skeletonised (Zhang-Suen), ordered by GCTT, and matched; points are matched as they
-/// are.
+/// Masks are skeletonised (Zhang-Suen), ordered by GCTT, and matched. Points are matched in their
+/// order; if view 2 runs against view 1 it is turned round first, and the diagnostics say so.
 ///
 /// # Errors
 /// [`Error`], which names the case and the stage; never an empty curve, never a NaN.
@@ -36,7 +37,9 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
     let traces = match params.input {
         InputKind::Points => {
             let (points1, points2) = pair.points.as_ref().ok_or_else(missing)?;
-            Traces::given(points1.clone(), points2.clone())
+            let reversed = runs_against(points1, points2, &pair.rig)
+                .map_err(|source| Error::Matching { case: case(), source })?;
+            Traces::given(points1.clone(), points2.clone(), reversed)
         }
         InputKind::Mask => {
             let [mask1, mask2] = pair.masks.as_ref().ok_or_else(missing)?;

@@ -81,12 +81,21 @@ pub struct Traces {
     pub coverage: [f64; 2],
     /// Steps longer than 3 px in each view's trace, 0 where the points were given.
     pub jumps: [usize; 2],
+    /// Whether the points of view 2 were given against those of view 1, and turned round.
+    pub view2_reversed: bool,
 }
 
 impl Traces {
-    /// Curves that were given in order.
-    pub(crate) fn given(points1: Vec<Pixel<View1>>, points2: Vec<Pixel<View2>>) -> Self {
-        Self { points1, points2, coverage: [1.0; 2], jumps: [0; 2] }
+    /// Curves that were given in order; `reversed` turns that of view 2 round.
+    pub(crate) fn given(
+        points1: Vec<Pixel<View1>>,
+        mut points2: Vec<Pixel<View2>>,
+        reversed: bool,
+    ) -> Self {
+        if reversed {
+            points2.reverse();
+        }
+        Self { points1, points2, coverage: [1.0; 2], jumps: [0; 2], view2_reversed: reversed }
     }
 
     /// Curves that were traced from skeletons.
@@ -96,6 +105,7 @@ impl Traces {
             jumps: [trace1.jumps.len(), trace2.jumps.len()],
             points1: trace1.points,
             points2: trace2.points,
+            view2_reversed: false,
         }
     }
 }

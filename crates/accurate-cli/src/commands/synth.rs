@@ -12,7 +12,11 @@ use crate::failure::Failure;
 pub fn run(args: &SynthArgs, console: &Console) -> Result<(), Failure> {
     let options = case_options(&args.disturbances);
     let bar = console.progress(args.count as usize, "generating");
-    (0..args.count).into_par_iter().try_for_each(|index| {
+    let last = args
+        .first
+        .checked_add(args.count)
+        .ok_or_else(|| Failure::new(Failure::USAGE, "--first plus --count is too large"))?;
+    (args.first..last).into_par_iter().try_for_each(|index| {
         let case = generate(args.family, args.seed, index, &options)?;
         let images = args.xray.then(|| xray_images(&case));
         let dir = args.out.join(format!("case_{index:03}"));
