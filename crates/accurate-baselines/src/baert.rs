@@ -18,10 +18,12 @@ use crate::track::Track;
 /// lines, starting at the tip. The order along view 2, the limit and the monotone fill are known
 /// from the method's use on Guide3D (Jianu et al., 2024). Our choices:
 /// - **The first correspondence.** Ordered curves start at the same physical tip, so both starts
-///   correspond: the first crossing is sought around the start of view 2, under the same limit as
-///   every other. The tips themselves are no match (their epipolar distance need not be 0).
+///   correspond; but one view may see a piece more than the other. Then the start of one curve
+///   corresponds to a crossing of its epipolar line with the other curve. All these starts are
+///   followed, and the one that matches the most samples wins, the two tips before the others. A
+///   start is only where the search begins, no match by itself.
 /// - **The expected place** advances from the last match at the ratio of the arc lengths from the
-///   tips to it; before 30 px, at the ratio of the whole curves, of which it never differs by more
+///   start to it; before 30 px, at the ratio of the whole curves, of which it never differs by more
 ///   than a factor of 3. (A more local ratio runs off to 0 or infinity at a stretch along the
 ///   epipolar lines, just where it is needed.)
 /// - Smoothing, exact crossings, Lindstrom's triangulation and resampling.
@@ -29,7 +31,7 @@ use crate::track::Track;
 /// Before the first and after the last match nothing is filled.
 ///
 /// # Cost
-/// O(samples · spline spans).
+/// O(starts · samples · spline spans); there are rarely more than five starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Baert {
     /// Noise of the input points per coordinate, px: how closely the splines follow them; 0 for
@@ -72,7 +74,7 @@ impl CurveMatcher for Baert {
         let track2 = Track::new(curve2, self.sigma_px)?;
         let scene = Scene { rig, track1: &track1, track2: &track2 };
         let samples = track1.samples(self.step_px, usize::MAX);
-        let (matches, candidates) = follow(&scene, &samples, self.limit_px);
+        let (matches, candidates) = best_of_starts(&scene, &samples, self.limit_px);
         if matches.is_empty() {
             return Err(MatchError::NoCorrespondence { method: Self::NAME, candidates });
         }
@@ -80,39 +82,64 @@ impl CurveMatcher for Baert {
     }
 }
 
+/// The longest list of matches over all starts, the first of equals, and the number of crossings
+/// seen on the way.
+fn best_of_starts(scene: &Scene<'_>, samples: &[f64], limit_px: f64) -> (Vec<Match>, usize) {
+    let f = scene.rig.fundamental();
+    let mut starts: Vec<Match> = vec![(0.0, 0.0)];
+    if let Ok(line) = f.transpose().line(scene.track1.pixel(0.0)) {
+        starts.extend(scene.track2.crossings(&line).into_iter().map(|u2| (0.0, u2)));
+    }
+    if let Ok(line) = f.line(scene.track2.pixel(0.0)) {
+        starts.extend(scene.track1.crossings(&line).into_iter().map(|u1| (u1, 0.0)));
+    }
+    let mut best = Vec::new();
+    let mut candidates = 0;
+    for start in starts {
+        let (matches, seen) = follow(scene, samples, start, limit_px);
+        candidates += seen;
+        if matches.len() > best.len() {
+            best = matches;
+        }
+    }
+    (best, candidates)
+}
+
 /// Matches in the order of the samples, and the number of crossings seen.
-fn follow(scene: &Scene<'_>, samples: &[f64], limit_px: f64) -> (Vec<Match>, usize) {
+fn follow(scene: &Scene<'_>, samples: &[f64], start: Match, limit_px: f64) -> (Vec<Match>, usize) {
     let whole = scene.track2.length_px() / scene.track1.length_px();
     let line_of = scene.rig.fundamental().transpose();
+    let mut last = start;
     let mut matches: Vec<Match> = Vec::new();
     let mut candidates = 0;
-    for &u1 in samples {
+    for &u1 in samples.iter().filter(|u1| **u1 >= start.0) {
         // At the epipole there is no line: the sample stays open.
         let Ok(line) = line_of.line(scene.track1.pixel(u1)) else { continue };
-        let (last1, last2) = matches.last().copied().unwrap_or((0.0, 0.0));
-        let expected = last2 + running_ratio((last1, last2), whole) * (u1 - last1);
+        let ratio = running_ratio((last.0 - start.0, last.1 - start.1), whole);
+        let expected = last.1 + ratio * (u1 - last.0);
         let crossings = scene.track2.crossings(&line);
         candidates += crossings.len();
         let off = |u2: f64| (u2 - expected).abs();
         let best = crossings
             .into_iter()
-            .filter(|&u2| u2 >= last2 && off(u2) <= limit_px)
+            .filter(|&u2| u2 >= last.1 && off(u2) <= limit_px)
             .min_by(|a, b| off(*a).total_cmp(&off(*b)));
         if let Some(u2) = best {
-            matches.push((u1, u2));
+            last = (u1, u2);
+            matches.push(last);
         }
     }
     (matches, candidates)
 }
 
-/// How far view 2 has advanced per px of view 1, from the tips to the last match.
-fn running_ratio((last1, last2): Match, whole: f64) -> f64 {
+/// How far view 2 has advanced per px of view 1, from the start to the last match.
+fn running_ratio((advance1, advance2): Match, whole: f64) -> f64 {
     const SETTLED_PX: f64 = 30.0;
     const FACTOR: f64 = 3.0;
-    if last1 < SETTLED_PX {
+    if advance1 < SETTLED_PX {
         return whole;
     }
-    (last2 / last1).clamp(whole / FACTOR, whole * FACTOR)
+    (advance2 / advance1).clamp(whole / FACTOR, whole * FACTOR)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use crate::grid_path::{cheapest_grid_path, cheapest_of_each_run};
 use crate::pchip::Pchip;
 use crate::range::{not_negative, positive};
 use crate::reprojection_fit::{Fit, Observation, Prior, fit};
+use crate::resample::{Match, Scene};
 use crate::track::Track;
 
 /// Baur-style reconstruction: `baur`.
@@ -120,17 +121,19 @@ impl Baur {
             .map(|(i, j)| PixelPair { cell: (i, j), pixel1: samples1[i], pixel2: samples2[j] })
             .collect();
         let mut curve = triangulate_pairs(Self::NAME, rig, Triangulation::LindstromNiter2, &pairs)?;
-        let places: Vec<(f64, f64)> =
+        let places: Vec<Match> =
             curve.pairs.iter().map(|&(i, j)| (places1[i], places2[j])).collect();
         for (cell, place) in curve.pairs.iter_mut().zip(&places) {
             *cell = (track1.nearest_input(place.0), track2.nearest_input(place.1));
         }
-        let fitted = self.fit_to(&curve, &places, rig).and_then(|(fit, observations)| {
-            Some((self.resample(&fit, &observations, &curve, rig)?, fit))
+        let scene = Scene { rig, track1: &track1, track2: &track2 };
+        let fitted = self.fit_to(&curve, &places, rig).and_then(|fit| {
+            let resampled = self.resample(&fit, &places, &scene)?;
+            Some((resampled, fit))
         });
         let refinement = match fitted {
             Some((resampled, fit)) => {
-                curve = resampled;
+                curve = CurveReconstruction { dropped: curve.dropped, ..resampled };
                 Refinement::Converged { iterations: fit.iterations, rms_px: fit.rms_px }
             }
             None => Refinement::Failed,
@@ -152,19 +155,13 @@ impl Baur {
         Ok(())
     }
 
-    fn fit_to(
-        &self,
-        curve: &CurveReconstruction,
-        places: &[(f64, f64)],
-        rig: &Rig,
-    ) -> Option<(Fit, Vec<Observation>)> {
+    fn fit_to(&self, curve: &CurveReconstruction, places: &[Match], rig: &Rig) -> Option<Fit> {
         let observations: Vec<Observation> = curve
             .points
             .iter()
             .zip(places)
             .map(|(point, place)| Observation {
-                // Smooth where either view is: chords of noisy triangulated points would not be.
-                t: 0.5 * (place.0 + place.1),
+                t: parameter(place),
                 pixel1: point.pixel1,
                 pixel2: point.pixel2,
                 position: point.position,
@@ -179,49 +176,39 @@ impl Baur {
             max_iterations: self.max_iterations,
         };
         // A span without an observation has only the curvature weight to hold it.
-        let fit = fit(&observations, spans.min(observations.len()), rig, &prior)?;
-        Some((fit, observations))
+        fit(&observations, spans.min(observations.len()), rig, &prior)
     }
 
     /// Points at equal steps of the arc length; `None` if one is not in front of both cameras.
     fn resample(
         &self,
         fit: &Fit,
-        observations: &[Observation],
-        matched: &CurveReconstruction,
-        rig: &Rig,
+        places: &[Match],
+        scene: &Scene<'_>,
     ) -> Option<CurveReconstruction> {
-        let length = fit.spline.length();
-        let count = match self.output_step {
-            Some(step) => ((length / step).round() as usize).clamp(1, MAX_OUTPUT) + 1,
-            None => {
-                (fit.spline.width * fit.spline.spans() as f64).clamp(1.0, MAX_OUTPUT as f64)
-                    as usize
-                    + 1
-            }
+        let steps = match self.output_step {
+            Some(step) => fit.spline.length() / step,
+            None => fit.spline.width * fit.spline.spans() as f64,
         };
-        let along = |of: fn(&Observation) -> f64| {
-            let knots: Vec<_> = observations.iter().map(|o| (o.t, of(o))).collect();
+        let count = (steps.round() as usize).clamp(1, MAX_OUTPUT) + 1;
+        let along = |of: fn(&Match) -> f64| {
+            let knots: Vec<_> = places.iter().map(|p| (parameter(p), of(p))).collect();
             Pchip::new(&knots).ok()
         };
-        let (x1, y1) = (along(|o| o.pixel1.x)?, along(|o| o.pixel1.y)?);
-        let (x2, y2) = (along(|o| o.pixel2.x)?, along(|o| o.pixel2.y)?);
+        let (place1, place2) = (along(|p| p.0)?, along(|p| p.1)?);
         let mut points = Vec::with_capacity(count);
         let mut pairs = Vec::with_capacity(count);
         for t in equal_steps(fit, count) {
             let position = fit.spline.point(t);
-            rig.project(&position).ok()?;
+            scene.rig.project(&position).ok()?;
             // The matched pixels, not the projections: their distance says how well views agree.
-            let pixel1 = Pixel::new(x1.value(t), y1.value(t));
-            let pixel2 = Pixel::new(x2.value(t), y2.value(t));
-            let epipolar_distance_px = rig.fundamental().line(pixel2).ok()?.distance(pixel1);
+            let (u1, u2) = (place1.value(t), place2.value(t));
+            let (pixel1, pixel2) = (scene.track1.pixel(u1), scene.track2.pixel(u2));
+            let epipolar_distance_px = scene.rig.fundamental().line(pixel2).ok()?.distance(pixel1);
             points.push(CurvePoint { position, pixel1, pixel2, epipolar_distance_px });
-            let after = observations.partition_point(|o| o.t < t).min(observations.len() - 1);
-            let before = after.saturating_sub(1);
-            let nearer_before = t - observations[before].t < observations[after].t - t;
-            pairs.push(matched.pairs[if nearer_before { before } else { after }]);
+            pairs.push((scene.track1.nearest_input(u1), scene.track2.nearest_input(u2)));
         }
-        Some(CurveReconstruction { points, pairs, dropped: matched.dropped })
+        Some(CurveReconstruction { points, pairs, dropped: 0 })
     }
 }
 
@@ -254,6 +241,12 @@ impl CurveMatcher for Baur {
     ) -> Result<CurveReconstruction, MatchError> {
         Ok(self.solve(curve1, curve2, rig)?.curve)
     }
+}
+
+/// Curve parameter of a matched pair, px: smooth where either view is, as the chords of noisy
+/// triangulated points would not be.
+fn parameter(place: &Match) -> f64 {
+    0.5 * (place.0 + place.1)
 }
 
 /// Magnification at the middle of the curve: focal length over depth, mean of both views.
