@@ -162,7 +162,13 @@ impl<const D: usize> BSpline<D> {
 
     /// The point and its three derivatives at `t`, cheaper than one by one.
     pub fn jet(&self, t: f64) -> Jet<D> {
-        let (first, rows) = self.basis_derivatives(t);
+        let (span, t) = self.span(t);
+        self.jet_in_span(span, t)
+    }
+
+    /// The jet of the polynomial piece of a non-empty span.
+    pub(crate) fn jet_in_span(&self, span: usize, t: f64) -> Jet<D> {
+        let (first, rows) = (span - 3, basis_derivatives(&self.knots, span, t));
         Jet {
             point: Point::from(self.combine(first, &rows[0])),
             first: self.combine(first, &rows[1]),

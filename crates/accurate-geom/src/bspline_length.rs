@@ -1,6 +1,7 @@
 use nalgebra::Point;
 
 use crate::BSpline;
+use crate::bspline_piece::Piece;
 
 /// Nodes and weights of the 8-point Gauss-Legendre rule on `[-1, 1]`, positive half.
 const GAUSS_LEGENDRE: [(f64, f64); 4] = [
@@ -33,20 +34,12 @@ impl<const D: usize> BSpline<D> {
         if to < from {
             return -self.arc_length_between(to, from);
         }
-        let mut total = 0.0;
-        let mut left = from;
-        let breakpoints = self.breakpoints();
-        let first = breakpoints.partition_point(|b| *b <= from);
-        for right in breakpoints[first..].iter().map(|b| b.min(to)) {
-            if right > left {
-                total += self.length_within_span(left, right);
-            }
-            left = right;
-            if right >= to {
-                break;
-            }
-        }
-        total
+        self.spans()
+            .map(|span| self.piece(span))
+            .map(|piece| (from.max(piece.start), to.min(piece.end), piece))
+            .filter(|(left, right, _)| left < right)
+            .map(|(left, right, piece)| piece.length(left, right))
+            .sum()
     }
 
     /// `count` parameters at equal arc lengths, the first and the last parameter included; fewer
@@ -56,24 +49,23 @@ impl<const D: usize> BSpline<D> {
         if count < 2 {
             return vec![start];
         }
-        let breakpoints = self.breakpoints();
-        let lengths: Vec<f64> =
-            breakpoints.windows(2).map(|w| self.length_within_span(w[0], w[1])).collect();
+        let pieces: Vec<_> = self.spans().map(|span| self.piece(span)).collect();
+        let lengths: Vec<f64> = pieces.iter().map(|p| p.length(p.start, p.end)).collect();
         let total: f64 = lengths.iter().sum();
         let mut parameters = vec![start];
-        let (mut span, mut passed) = (0, 0.0);
+        let (mut current, mut passed) = (0, 0.0);
         // Continue from the last parameter found, so that each integral is short.
         let (mut t, mut reached) = (start, 0.0);
         for index in 1..count - 1 {
             let target = total * index as f64 / (count - 1) as f64;
-            while span + 1 < lengths.len() && passed + lengths[span] < target {
-                passed += lengths[span];
-                span += 1;
-                (t, reached) = (breakpoints[span], passed);
+            while current + 1 < lengths.len() && passed + lengths[current] < target {
+                passed += lengths[current];
+                current += 1;
+                (t, reached) = (pieces[current].start, passed);
             }
-            let right = breakpoints[span + 1];
-            let found = self.advance(t, right, target - reached, RELATIVE_TOLERANCE * total);
-            reached += self.length_within_span(t, found);
+            let piece = &pieces[current];
+            let found = piece.advance(t, target - reached, RELATIVE_TOLERANCE * total);
+            reached += piece.length(t, found);
             t = found;
             parameters.push(t);
         }
@@ -85,18 +77,20 @@ impl<const D: usize> BSpline<D> {
     pub fn sample(&self, count: usize) -> Vec<Point<f64, D>> {
         self.uniform_parameters(count).into_iter().map(|t| self.at(t)).collect()
     }
+}
 
-    /// The parameter in `[from, right]` (one span) that lies `length` beyond `from`: Newton inside
+impl<const D: usize> Piece<D> {
+    /// The parameter that lies `length` beyond `from`, at most the end of the piece: Newton inside
     /// a shrinking bracket.
-    fn advance(&self, from: f64, right: f64, length: f64, tolerance: f64) -> f64 {
-        let (mut low, mut high) = (from, right);
-        let speed = self.derivative(from).norm();
-        let mut t = from + if speed > 0.0 { length / speed } else { 0.5 * (right - from) };
+    fn advance(&self, from: f64, length: f64, tolerance: f64) -> f64 {
+        let (mut low, mut high) = (from, self.end);
+        let speed = self.speed(from);
+        let mut t = from + if speed > 0.0 { length / speed } else { 0.5 * (high - low) };
         for _ in 0..60 {
             if !(t > low && t < high) {
                 t = 0.5 * (low + high);
             }
-            let excess = self.length_within_span(from, t) - length;
+            let excess = self.length(from, t) - length;
             if excess.abs() <= tolerance || high - low <= f64::EPSILON * high.abs() {
                 break;
             }
@@ -105,13 +99,17 @@ impl<const D: usize> BSpline<D> {
             } else {
                 low = t;
             }
-            let speed = self.derivative(t).norm();
+            let speed = self.speed(t);
             t = if speed > 0.0 { t - excess / speed } else { 0.5 * (low + high) };
         }
-        t.clamp(from, right)
+        t.clamp(from, self.end)
     }
 
-    fn length_within_span(&self, from: f64, to: f64) -> f64 {
+    fn speed(&self, t: f64) -> f64 {
+        self.velocity(t).norm()
+    }
+
+    fn length(&self, from: f64, to: f64) -> f64 {
         let whole = self.quadrature(from, to);
         self.refine(from, to, whole, RELATIVE_TOLERANCE * whole, MAX_DEPTH)
     }
@@ -128,10 +126,9 @@ impl<const D: usize> BSpline<D> {
 
     fn quadrature(&self, from: f64, to: f64) -> f64 {
         let (centre, half) = (0.5 * (from + to), 0.5 * (to - from));
-        let speed = |t: f64| self.derivative(t).norm();
         let sum: f64 = GAUSS_LEGENDRE
             .iter()
-            .map(|(x, w)| w * (speed(centre - half * x) + speed(centre + half * x)))
+            .map(|(x, w)| w * (self.speed(centre - half * x) + self.speed(centre + half * x)))
             .sum();
         half * sum
     }

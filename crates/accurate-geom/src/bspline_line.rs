@@ -10,7 +10,7 @@ impl BSpline<2> {
     /// # Cost
     /// O(n) for n control points, plus a safeguarded Newton iteration per crossing.
     pub fn intersect_line(&self, a: f64, b: f64, c: f64) -> Vec<f64> {
-        let Some(pieces) = self.monotone_pieces(a, b, c) else { return Vec::new() };
+        let Some(pieces) = self.monotone_pieces(a, b, c, true) else { return Vec::new() };
         let mut found = Vec::new();
         for piece in &pieces {
             if piece.left_value == 0.0 {
@@ -21,6 +21,7 @@ impl BSpline<2> {
                 found.push(piece.root());
             }
         }
+        // Spans left out do not touch the line, so only the last end has no piece to its right.
         if let Some(last) = pieces.last().filter(|piece| piece.right_value == 0.0) {
             found.push(last.right);
         }
@@ -32,7 +33,7 @@ impl BSpline<2> {
     /// ascending: where the curve runs parallel to the line and turns back. Near-tangent contacts
     /// are extrema of small value.
     pub fn line_extrema(&self, a: f64, b: f64, c: f64) -> Vec<f64> {
-        let Some(pieces) = self.monotone_pieces(a, b, c) else { return Vec::new() };
+        let Some(pieces) = self.monotone_pieces(a, b, c, false) else { return Vec::new() };
         let mut found = Vec::new();
         let mut direction = 0.0;
         for piece in &pieces {
@@ -48,13 +49,32 @@ impl BSpline<2> {
         found
     }
 
-    /// The curve cut at its knots and wherever the value of the line is stationary. `None` if a
-    /// value is not finite.
-    fn monotone_pieces(&self, a: f64, b: f64, c: f64) -> Option<Vec<MonotonePiece>> {
-        let breakpoints = self.breakpoints();
-        let mut pieces: Vec<MonotonePiece> = Vec::with_capacity(2 * breakpoints.len());
-        for span in breakpoints.windows(2) {
-            let cubic = self.line_cubic(span[0], span[1], a, b, c);
+    /// The curve cut at its knots and wherever the value of the line is stationary. With
+    /// `near_zero`, without the spans that stay clear of the line. `None` if a value is not finite.
+    fn monotone_pieces(
+        &self,
+        a: f64,
+        b: f64,
+        c: f64,
+        near_zero: bool,
+    ) -> Option<Vec<MonotonePiece>> {
+        let control = self.control_points();
+        let values: Vec<f64> = control.iter().map(|p| a * p.x + b * p.y + c).collect();
+        let reach = control.iter().fold(0.0f64, |m, p| m.max(p.coords.amax()));
+        // Beyond this the sign of a value is no matter of rounding.
+        let margin = 64.0 * f64::EPSILON * ((a.abs() + b.abs()) * reach + c.abs());
+        if !values.iter().all(|v| v.is_finite()) || !margin.is_finite() {
+            return None;
+        }
+        let mut pieces: Vec<MonotonePiece> = Vec::new();
+        for span in self.spans() {
+            // The values of a span lie between those of its four control points.
+            let local = &values[span - 3..=span];
+            let clear = local.iter().all(|v| *v > margin) || local.iter().all(|v| *v < -margin);
+            if near_zero && clear {
+                continue;
+            }
+            let cubic = self.line_cubic(span, a, b, c);
             if !cubic.coefficients.iter().all(|v| v.is_finite()) {
                 return None;
             }
@@ -62,7 +82,8 @@ impl BSpline<2> {
             for right in cubic.stationary().into_iter().flatten().chain([1.0]) {
                 // One value per cut, shared by the pieces on both sides, so that no root is lost
                 // or doubled between them.
-                let left_value = pieces.last().map_or(cubic.at(0.0), |piece| piece.right_value);
+                let before = pieces.last().filter(|piece| piece.right == cubic.parameter(left));
+                let left_value = before.map_or_else(|| cubic.at(left), |piece| piece.right_value);
                 pieces.push(MonotonePiece {
                     left: cubic.parameter(left),
                     right: cubic.parameter(right),
@@ -77,8 +98,9 @@ impl BSpline<2> {
         Some(pieces)
     }
 
-    fn line_cubic(&self, start: f64, end: f64, a: f64, b: f64, c: f64) -> LineCubic {
-        let jet = self.jet(start);
+    fn line_cubic(&self, span: usize, a: f64, b: f64, c: f64) -> LineCubic {
+        let (start, end) = (self.knots()[span], self.knots()[span + 1]);
+        let jet = self.jet_in_span(span, start);
         let h = end - start;
         let along = |x: f64, y: f64| a * x + b * y;
         LineCubic {
@@ -114,7 +136,7 @@ impl LineCubic {
     }
 
     fn parameter(&self, u: f64) -> f64 {
-        if u == 1.0 { self.end } else { self.start + u * (self.end - self.start) }
+        if u == 1.0 { self.end } else { (self.start + u * (self.end - self.start)).min(self.end) }
     }
 
     /// Zeros of the slope inside `(0, 1)`, ascending, by the quadratic formula that does not

@@ -19,6 +19,7 @@ mod bspline_closest;
 mod bspline_fit;
 mod bspline_length;
 mod bspline_line;
+mod bspline_piece;
 mod camera;
 mod distortion;
 mod epipolar;
