@@ -3,9 +3,12 @@
 
 use std::hint::black_box;
 
+use accurate3d::baselines::cheapest_grid_path;
 use accurate3d::eval::{curve_scores, table_scores};
 use accurate3d::geom::{Pixel, Point3, Triangulation, Triangulator, View1, View2};
-use accurate3d::matching::{CurveMatcher, Ecdp, EcdpParams};
+use accurate3d::matching::{
+    CostModel, CurveMatcher, DistanceKind, Ecdp, EcdpParams, TieOrder, align_rows,
+};
 use accurate3d::seg::{Mask, Skeleton, zhang_suen};
 use accurate3d::synth::{CaseOptions, Family, SynthCase, generate};
 use accurate3d::traverse::{TraverseParams, trace_single};
@@ -40,6 +43,25 @@ fn matching(c: &mut Criterion) {
         group.throughput(Throughput::Elements((n * n) as u64));
         group.bench_with_input(BenchmarkId::from_parameter(n), &n, |b, _| {
             b.iter(|| ecdp.reconstruct(black_box(&p1), black_box(&p2), &case.rig).unwrap());
+        });
+    }
+    group.finish();
+    // The paper's claim: the same optimum as Baur's graph search, found more efficiently.
+    let mut group = c.benchmark_group("monotone_matching");
+    group.sample_size(10);
+    for n in [256, 512, 1024] {
+        let (_, p1, p2) = curves(&case, n);
+        let f = case.rig.fundamental();
+        let model = CostModel::new(f, &p1, &p2, DistanceKind::View1).unwrap();
+        group.throughput(Throughput::Elements((n * n) as u64));
+        group.bench_with_input(BenchmarkId::new("ecdp", n), &n, |b, &n| {
+            b.iter(|| {
+                let fill = |i: usize, row: &mut [f64]| model.fill_row(i, row);
+                align_rows(n, n, fill, TieOrder::UpLeftDiagonal).unwrap()
+            });
+        });
+        group.bench_with_input(BenchmarkId::new("dijkstra", n), &n, |b, &n| {
+            b.iter(|| cheapest_grid_path(n, n, |i, j| model.cost(i, j)).unwrap());
         });
     }
     group.finish();
