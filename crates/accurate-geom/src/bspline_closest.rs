@@ -3,9 +3,8 @@ use nalgebra::Point;
 use crate::BSpline;
 use crate::bspline_piece::Piece;
 
-/// Samples per knot span among which local minima are sought. A cubic piece has at most five
-/// stationary distances.
-const SAMPLES_PER_SPAN: usize = 8;
+/// Halvings of a span: below 2⁻⁵⁰ of it parameters are no longer told apart.
+const MAX_DEPTH: usize = 50;
 
 const MAX_NEWTON_STEPS: usize = 40;
 
@@ -23,12 +22,13 @@ pub struct ClosestOnCurve<const D: usize> {
 impl<const D: usize> BSpline<D> {
     /// The nearest point of the whole curve.
     ///
-    /// Spans whose control points' bounding box is farther than the best point so far are left
-    /// out; in the others eight samples are taken and every local minimum is polished by Newton's
-    /// method. Exact unless one eighth of a knot span holds two minima.
+    /// The squared distance to a span is a polynomial of degree 6. Its Bernstein coefficients bound
+    /// it from below and count its minima; a span is halved until it is ruled out or holds one
+    /// minimum, which Newton's method finds. No minimum is missed.
     ///
     /// # Cost
-    /// O(n) boxes and about 16 evaluations for each span that is not ruled out.
+    /// O(n) bounding boxes of control points, and a few hundred operations for each span that
+    /// these do not rule out.
     pub fn closest(&self, query: &Point<f64, D>) -> ClosestOnCurve<D> {
         let (start, end) = self.domain();
         self.closest_between(query, start, end)
@@ -53,8 +53,11 @@ impl<const D: usize> BSpline<D> {
         for (span, distance) in boxes.iter().filter(|b| Some(b.0) == likeliest).chain(rest) {
             if *distance <= best.distance {
                 let piece = self.piece(*span);
-                let t = piece.closest(query, from.max(piece.start), to.min(piece.end));
-                best = nearer(best, self.candidate(t, query));
+                let (left, right) = (from.max(piece.start), to.min(piece.end));
+                let mut found = (best.distance * best.distance, best.parameter);
+                let distance = piece.squared_distance(query, left, right);
+                piece.search(query, left, right, &distance, MAX_DEPTH, &mut found);
+                best = nearer(best, self.candidate(found.1, query));
             }
         }
         best
@@ -80,25 +83,81 @@ impl<const D: usize> BSpline<D> {
 }
 
 impl<const D: usize> Piece<D> {
-    /// Parameter of the nearest point within `[start, end]`.
-    fn closest(&self, query: &Point<f64, D>, start: f64, end: f64) -> f64 {
-        let at = |i: usize| start + (end - start) * i as f64 / SAMPLES_PER_SPAN as f64;
-        let distance = |t: f64| (self.at(t) - query).norm_squared();
-        let distances: [f64; SAMPLES_PER_SPAN + 1] = std::array::from_fn(|i| distance(at(i)));
-        let mut best = (f64::INFINITY, start);
-        for i in 0..=SAMPLES_PER_SPAN {
-            let (before, after) = (i.saturating_sub(1), (i + 1).min(SAMPLES_PER_SPAN));
-            if distances[i] <= distances[before] && distances[i] <= distances[after] {
-                let t = self.polish(at(before), at(i), at(after), query);
-                // The sample itself stays in the race: the bracket may hold a maximum too.
-                for candidate in [(distances[i], at(i)), (distance(t), t)] {
-                    if candidate.0 < best.0 {
-                        best = candidate;
-                    }
-                }
+    /// Bernstein coefficients over `[start, end]` of the squared distance to `query`.
+    fn squared_distance(&self, query: &Point<f64, D>, start: f64, end: f64) -> [f64; 7] {
+        let h = end - start;
+        let offset = self.at(start) - query;
+        let (first, second) = (self.velocity(start) * h, self.acceleration(start) * (h * h));
+        let corners = [
+            offset,
+            offset + first / 3.0,
+            offset + first * (2.0 / 3.0) + second / 6.0,
+            self.at(end) - query,
+        ];
+        // Product of two Bernstein polynomials of degree 3.
+        const CHOOSE_3: [f64; 4] = [1.0, 3.0, 3.0, 1.0];
+        const CHOOSE_6: [f64; 7] = [1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0];
+        let mut product = [0.0; 7];
+        for i in 0..4 {
+            for j in 0..4 {
+                product[i + j] += CHOOSE_3[i] * CHOOSE_3[j] * corners[i].dot(&corners[j]);
             }
         }
-        best.1
+        std::array::from_fn(|k| product[k] / CHOOSE_6[k])
+    }
+
+    /// Lowers `best` (squared distance, parameter) to the minimum over `[start, end]`, where the
+    /// squared distance has the Bernstein coefficients `distance`.
+    fn search(
+        &self,
+        query: &Point<f64, D>,
+        start: f64,
+        end: f64,
+        distance: &[f64; 7],
+        depth: usize,
+        best: &mut (f64, f64),
+    ) {
+        let mut offer = |t: f64| {
+            let squared = (self.at(t) - query).norm_squared();
+            if squared < best.0 {
+                *best = (squared, t);
+            }
+        };
+        offer(start);
+        offer(end);
+        let least = distance.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = distance.iter().copied().fold(0.0, f64::max);
+        // The coefficients are known to the rounding of the largest.
+        if least > best.0 + 16.0 * f64::EPSILON * most {
+            return;
+        }
+        // The slope has no more zeros than its coefficients, the differences, have sign changes.
+        let mut changes = 0;
+        let mut sign = 0.0;
+        for pair in distance.windows(2) {
+            let rise = pair[1] - pair[0];
+            if rise * sign < 0.0 {
+                changes += 1;
+            }
+            if rise != 0.0 {
+                sign = rise.signum();
+            }
+        }
+        let middle = 0.5 * (start + end);
+        if changes == 0 {
+            return; // monotone: the ends were offered
+        }
+        if changes == 1 || depth == 0 || !(start < middle && middle < end) {
+            let t = self.polish(start, middle, end, query);
+            let squared = (self.at(t) - query).norm_squared();
+            if squared < best.0 {
+                *best = (squared, t);
+            }
+            return;
+        }
+        let (left, right) = halves(distance);
+        self.search(query, start, middle, &left, depth - 1, best);
+        self.search(query, middle, end, &right, depth - 1, best);
     }
 
     /// Newton on half the derivative of the squared distance, inside a bracket.
@@ -130,6 +189,20 @@ impl<const D: usize> Piece<D> {
         }
         t
     }
+}
+
+/// De Casteljau: the Bernstein coefficients over the left and the right half.
+fn halves(whole: &[f64; 7]) -> ([f64; 7], [f64; 7]) {
+    let mut row = *whole;
+    let (mut left, mut right) = ([0.0; 7], [0.0; 7]);
+    for level in 0..7 {
+        left[level] = row[0];
+        right[6 - level] = row[6 - level];
+        for k in 0..6 - level {
+            row[k] = 0.5 * (row[k] + row[k + 1]);
+        }
+    }
+    (left, right)
 }
 
 fn nearer<const D: usize>(best: ClosestOnCurve<D>, other: ClosestOnCurve<D>) -> ClosestOnCurve<D> {

@@ -117,3 +117,27 @@ impl Distortion {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wrong Jacobian would still converge, only slower, and misjudge folds: check it by itself.
+    #[test]
+    fn the_jacobian_is_that_of_finite_differences() {
+        let lens = Distortion { k1: -0.3, k2: 0.2, p1: 0.03, p2: -0.05, k3: 0.1 };
+        let h = 1e-5;
+        for (x, y) in [(0.0, 0.0), (0.4, -0.7), (-0.9, 0.1), (0.3, 0.8)] {
+            let p = Vector2::new(x, y);
+            let jacobian = lens.jacobian(&p);
+            for axis in 0..2 {
+                let step = Vector2::ith(axis, h);
+                let difference =
+                    (lens.distort(&(p + step)) - lens.distort(&(p - step))) / (2.0 * h);
+                // Third derivatives are below 50 here: h² / 6 of that, and rounding over h.
+                let error = (difference - jacobian.column(axis)).norm();
+                assert!(error < 10.0 * h * h + 4.0 * f64::EPSILON / h, "{error:e}");
+            }
+        }
+    }
+}

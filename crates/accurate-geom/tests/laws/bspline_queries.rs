@@ -116,6 +116,17 @@ proptest! {
         closest_equals_brute_force(&curve, Point3::new(x, y, 0.2 * y))?;
     }
 
+    /// Control points anywhere: spans that loop, with several local minima each.
+    #[test]
+    fn the_closest_point_of_a_tangled_curve_is_that_of_brute_force(
+        control in proptest::collection::vec((0.0..10.0f64, 0.0..10.0f64), 4..9),
+        x in 0.0..10.0f64, y in 0.0..10.0f64,
+    ) {
+        let control = control.into_iter().map(|(x, y)| Point2::new(x, y)).collect();
+        let curve = Curve2::with_uniform_knots(control).unwrap();
+        closest_equals_brute_force(&curve, Point2::new(x, y))?;
+    }
+
     #[test]
     fn a_point_of_the_curve_is_its_own_closest_point(
         curve in curves::<3>(4..20), share in 0.0..1.0f64,
