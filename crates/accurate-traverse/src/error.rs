@@ -1,3 +1,4 @@
+use accurate_geom::GeomError;
 use thiserror::Error;
 
 /// Why a skeleton could not be turned into an ordered curve.
@@ -98,11 +99,54 @@ pub enum TraverseError {
     /// A parameter is outside its range.
     #[error("parameter {name} = {value}: {expected}")]
     InvalidParameter {
-        /// Name of the field of [`TraverseParams`](crate::TraverseParams).
+        /// Name of the field of the parameters.
         name: &'static str,
         /// Its value.
         value: f64,
         /// What is accepted.
         expected: &'static str,
     },
+    /// Skeleton and radii are images of different shapes.
+    #[error("view {view}: the skeleton has shape {skeleton:?}, the radii have {radii:?}")]
+    ShapeMismatch {
+        /// 1 or 2.
+        view: u8,
+        /// (height, width) of the skeleton.
+        skeleton: (usize, usize),
+        /// (height, width) of the radii.
+        radii: (usize, usize),
+    },
+    /// A radius at a pixel of the skeleton is not a positive finite number.
+    #[error("view {view}: radius {value} at column {x}, row {y} of the skeleton")]
+    BadRadius {
+        /// 1 or 2.
+        view: u8,
+        /// Column, px.
+        x: usize,
+        /// Row, px.
+        y: usize,
+        /// The radius, px.
+        value: f64,
+    },
+    /// No two pixels of the skeleton touch.
+    #[error("view {view}: {pixels} skeleton pixels, none touches another")]
+    NoEdge {
+        /// 1 or 2.
+        view: u8,
+        /// Pixels of the skeleton.
+        pixels: usize,
+    },
+    /// A list does not have one entry per point.
+    #[error("{what}: {found} entries for {expected} points")]
+    LengthMismatch {
+        /// Which list.
+        what: &'static str,
+        /// Number of points.
+        expected: usize,
+        /// Entries found.
+        found: usize,
+    },
+    /// Points that make no curve.
+    #[error(transparent)]
+    Geometry(#[from] GeomError),
 }

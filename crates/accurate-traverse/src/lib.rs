@@ -24,14 +24,21 @@
 mod curvature;
 mod error;
 mod gctt;
+mod graph;
 mod pair;
 mod params;
 mod skeleton;
 mod trace;
+mod walk;
 
 pub use error::TraverseError;
 pub use gctt::{trace_from, trace_single};
+pub use graph::{GraphEdge, GraphNode, GraphParams, SkeletonGraph, fill_small_holes};
 pub use pair::{StartPair, start_pair, trace_pair};
 pub use params::{Norm, TraverseParams};
 pub use skeleton::endpoints;
 pub use trace::{Jump, Trace};
+pub use walk::{
+    Decision, HalfEdge, PointFlags, Walk, WalkCost, WalkEnd, WalkParams, k_best_walks,
+    k_best_walks_with_reward,
+};

@@ -1,0 +1,178 @@
+//! A skeleton as a graph of smooth edges between tips and junctions.
+
+mod fill;
+mod links;
+mod params;
+mod pixels;
+mod rough;
+mod smooth;
+
+use accurate_geom::{Pixel, Point2, View};
+use ndarray::Array2;
+
+pub use fill::fill_small_holes;
+pub use params::GraphParams;
+
+use crate::TraverseError;
+
+/// A tip, a junction, or a place where a link meets the body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GraphNode<V: View> {
+    /// Position, px: the pixel of a tip, the centroid of a junction's pixels.
+    pub at: Pixel<V>,
+    /// Edges that end here without the links; a loop counts twice. 1 is a tip.
+    pub degree: usize,
+}
+
+impl<V: View> GraphNode<V> {
+    /// Whether the body visibly ends here.
+    pub fn is_tip(&self) -> bool {
+        self.degree == 1
+    }
+}
+
+/// A stretch of the body between two nodes, or a link across a stretch that cannot be seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GraphEdge<V: View> {
+    /// The nodes at the first and the last point.
+    pub ends: [usize; 2],
+    /// Smooth polyline from node to node, about 1 px from point to point; a link has two points.
+    pub points: Vec<Pixel<V>>,
+    /// Distance to the background at each point, px; 0 on a link.
+    pub radii: Vec<f64>,
+    /// Length of the polyline, px.
+    pub length_px: f64,
+    /// Whether this is a link.
+    pub link: bool,
+}
+
+/// The skeleton of a mask as a graph: tips and junctions joined by smooth polylines, and links over
+/// gaps.
+///
+/// Junction pixels that touch are one node at their centroid. Artefacts of thinning (short side
+/// branches, tiny loops, specks) are dropped, junctions less than
+/// [`GraphParams::contract_px`] apart joined. Two edges may have the same two nodes, and an edge may
+/// end where it starts; a closed curve without a junction is one such edge.
+///
+/// # Symmetry
+/// Turning or mirroring the *skeleton* by multiples of 90° does the same to the graph, up to
+/// rounding and the numbers of nodes and edges, as long as no two edges that compete for being
+/// dropped are equally long and equally straight. Turning the *mask* moves the skeleton itself by up
+/// to about 1 px, as the half-steps of thinning take the south-east before the north-west, and may
+/// split a junction in another way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SkeletonGraph<V: View> {
+    nodes: Vec<GraphNode<V>>,
+    edges: Vec<GraphEdge<V>>,
+    mask_thickness_px: f64,
+}
+
+impl<V: View> SkeletonGraph<V> {
+    /// The graph of a skeleton (8-connected, one pixel wide).
+    ///
+    /// `skeleton` and `radii` have shape (height, width), index `[[y, x]]`; `radii` is the distance
+    /// from pixel centre to the nearest background centre, px, read on the skeleton only.
+    /// `mask_thickness_px` is the width of the strands of the mask, px.
+    ///
+    /// # Errors
+    /// [`TraverseError::ShapeMismatch`], [`TraverseError::Empty`], [`TraverseError::TooSmall`],
+    /// [`TraverseError::NoEdge`], [`TraverseError::BadRadius`], and
+    /// [`TraverseError::InvalidParameter`] for a thickness that is not positive or a bad field of
+    /// `params`.
+    ///
+    /// # Cost
+    /// One scan of the image and O(pixels) besides; quadratic in the number of edges.
+    pub fn new(
+        skeleton: &Array2<bool>,
+        radii: &Array2<f64>,
+        mask_thickness_px: f64,
+        params: &GraphParams,
+    ) -> Result<Self, TraverseError> {
+        let view = V::NUMBER;
+        params.validate()?;
+        if !(mask_thickness_px > 0.0 && mask_thickness_px.is_finite()) {
+            let (name, value) = ("mask_thickness_px", mask_thickness_px);
+            let expected = "a positive finite number";
+            return Err(TraverseError::InvalidParameter { name, value, expected });
+        }
+        if skeleton.dim() != radii.dim() {
+            let (skeleton, radii) = (skeleton.dim(), radii.dim());
+            return Err(TraverseError::ShapeMismatch { view, skeleton, radii });
+        }
+        let mut pixels = 0;
+        for ((y, x), _) in skeleton.indexed_iter().filter(|(_, set)| **set) {
+            let value = radii[[y, x]];
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(TraverseError::BadRadius { view, x, y, value });
+            }
+            pixels += 1;
+        }
+        match pixels {
+            0 => return Err(TraverseError::Empty { view }),
+            1 => return Err(TraverseError::TooSmall { view, pixels }),
+            _ => {}
+        }
+        let mut rough = pixels::trace(skeleton, radii);
+        rough.simplify(mask_thickness_px, params);
+        if rough.edges.is_empty() {
+            return Err(TraverseError::NoEdge { view, pixels });
+        }
+        let mut number = vec![None; rough.nodes.len()];
+        let mut nodes: Vec<GraphNode<V>> = Vec::new();
+        let mut edges = Vec::with_capacity(rough.edges.len());
+        for edge in &rough.edges {
+            let ends = edge.ends.map(|node| {
+                let id = *number[node].get_or_insert_with(|| {
+                    nodes.push(GraphNode { at: rough.nodes[node].into(), degree: 0 });
+                    nodes.len() - 1
+                });
+                nodes[id].degree += 1;
+                id
+            });
+            let (points, radii) =
+                smooth::smooth(&edge.points, &edge.radii, params.smooth_sigma_px)?;
+            edges.push(GraphEdge::body(ends, points.into_iter().map(Pixel::from).collect(), radii));
+        }
+        links::add(&mut nodes, &mut edges, params);
+        Ok(Self { nodes, edges, mask_thickness_px })
+    }
+
+    /// The nodes; an edge refers to them by index.
+    pub fn nodes(&self) -> &[GraphNode<V>] {
+        &self.nodes
+    }
+
+    /// The edges, links among them.
+    pub fn edges(&self) -> &[GraphEdge<V>] {
+        &self.edges
+    }
+
+    /// Width of the strands of the mask, px, as given.
+    pub fn mask_thickness_px(&self) -> f64 {
+        self.mask_thickness_px
+    }
+
+    /// Length of all edges but the links, px.
+    pub fn length_px(&self) -> f64 {
+        self.edges.iter().filter(|e| !e.link).map(|e| e.length_px).sum()
+    }
+}
+
+impl<V: View> GraphEdge<V> {
+    fn body(ends: [usize; 2], points: Vec<Pixel<V>>, radii: Vec<f64>) -> Self {
+        let length_px = points.windows(2).map(|w| w[0].distance(w[1])).sum();
+        Self { ends, points, radii, length_px, link: false }
+    }
+
+    fn bridge(ends: [usize; 2], from: Pixel<V>, to: Pixel<V>) -> Self {
+        let length_px = from.distance(to);
+        Self { ends, points: vec![from, to], radii: vec![0.0; 2], length_px, link: true }
+    }
+
+    /// The point at index `k` from the end `side` (0: first, 1: last), or the farthest there is.
+    pub(crate) fn from_end(&self, side: usize, k: usize) -> Point2 {
+        let last = self.points.len() - 1;
+        let k = k.min(last);
+        self.points[if side == 0 { k } else { last - k }].point()
+    }
+}
