@@ -84,8 +84,13 @@ fn view<V: View>(name: String, mask: &Array2<bool>, truth: &[Pixel<V>]) -> Outco
     let start = Instant::now();
     let walks = k_best_walks(&graph, &WalkParams::DEFAULT).expect("walks");
     let walks_ms = start.elapsed().as_secs_f64() * 1e3;
-    let rank =
-        |free: bool| walks.iter().position(|walk| is_right(walk, truth, free)).map(|r| r + 1);
+    let rank = |free: bool, tol: f64| {
+        walks.iter().position(|walk| is_right(walk, truth, free, tol)).map(|r| r + 1)
+    };
+    let reach = [3.0, 4.0, 6.0, 8.0, 12.0, 20.0, 40.0]
+        .into_iter()
+        .find(|&tol| rank(true, tol).is_some())
+        .unwrap_or(f64::INFINITY);
     Outcome {
         name,
         strict: rank(false, TOLERANCE_PX),
