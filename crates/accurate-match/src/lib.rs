@@ -12,21 +12,29 @@
 //! # Source
 //! ACCURATE, section 2.3.
 
+mod angle_signal;
 mod cost;
 mod dp;
 mod ecdp;
+mod ends;
 mod error;
+mod interval_dp;
 mod matcher;
 mod pairs;
+mod propose;
 mod ray_image;
 mod refine;
 
+pub use angle_signal::{AngleProfile, AngleSignal};
 pub use cost::{CostModel, DistanceKind, validate_curve};
 pub use dp::{Alignment, MAX_ALIGNMENT_BYTES, TieOrder, align, align_rows};
 pub use ecdp::{Ecdp, EcdpParams};
+pub use ends::FreeEnds;
 pub use error::MatchError;
+pub use interval_dp::{IntervalPrices, interval_energy};
 pub use matcher::{CurveMatcher, CurvePoint, CurveReconstruction};
 pub use pairs::{PixelPair, triangulate_pairs};
+pub use propose::{Proposal, ProposeParams, SignalCurve, propose_pairs};
 pub use refine::{
     ON_LINE_PX, RefineDirections, RefineRule, horizontal_runs, longest_run, refine, vertical_runs,
 };
