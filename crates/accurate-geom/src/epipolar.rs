@@ -59,10 +59,14 @@ impl<A: View, B: View> Fundamental<A, B> {
     /// # Errors
     /// [`GeomError::AtEpipole`] if the pixel is the epipole of view `B`.
     pub fn line(&self, pixel_b: Pixel<B>) -> Result<EpipolarLine<A>, GeomError> {
-        let line = self.matrix * pixel_b.homogeneous();
+        let pixel = pixel_b.homogeneous();
+        let line = self.matrix * pixel;
         let normal = line.x.hypot(line.y);
-        // NaN fails the comparison too, and is refused with it.
-        if !(normal > 1e-12 * line.norm()) {
+        // At the epipole the terms of `F p` cancel and what is left is rounding noise, which must
+        // not pass for a line: it is compared with the terms, not with itself. The second test is
+        // for the line at infinity. NaN fails both, and is refused with them.
+        let terms = self.matrix.abs() * pixel.abs();
+        if !(normal > 1e-12 * terms.x.hypot(terms.y) && normal > 1e-12 * line.norm()) {
             return Err(GeomError::AtEpipole { view: B::NUMBER, x: pixel_b.x, y: pixel_b.y });
         }
         Ok(EpipolarLine { coefficients: line / normal, view: PhantomData })

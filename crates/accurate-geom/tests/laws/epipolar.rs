@@ -1,7 +1,7 @@
 use accurate_geom::nalgebra::{Matrix3, Rotation3, Vector3};
 use accurate_geom::{
-    Camera, Fundamental, Pixel, Point3, Rig, View1, View2, epipolar_distance, sampson_distance,
-    symmetric_epipolar_distance,
+    Camera, Fundamental, GeomError, Pixel, Point3, Rig, View1, View2, epipolar_distance,
+    sampson_distance, symmetric_epipolar_distance,
 };
 use proptest::prelude::*;
 
@@ -39,6 +39,17 @@ proptest! {
         let tolerance = 8.0 * f64::EPSILON * condition * growth;
         let difference = (expected - found).norm().min((expected + found).norm());
         prop_assert!(difference <= tolerance, "{difference:e} > {tolerance:e}");
+    }
+
+    /// Not a line through rounding noise, which would look like any other.
+    #[test]
+    fn the_rounded_epipole_of_any_rig_has_no_line(scene in scenes()) {
+        let (c1, c2) = (scene.rig.camera1(), scene.rig.camera2());
+        let e = c2.projection_matrix() * c1.centre().to_homogeneous();
+        prop_assume!(e.z.abs() > 1e-3 * e.norm() / c2.k()[(0, 0)].abs());
+        let epipole2 = Pixel::new(e.x / e.z, e.y / e.z);
+        let refused = scene.rig.fundamental().line(epipole2);
+        prop_assert!(matches!(refused, Err(GeomError::AtEpipole { view: 2, .. })), "{refused:?}");
     }
 
     #[test]
