@@ -10,7 +10,7 @@
 use std::time::Instant;
 
 use accurate_geom::{Pixel, View, View1, View2};
-use accurate_seg::{Mask, distance_to_background, median_width_px, zhang_suen};
+use accurate_seg::{Mask, distance_to_background, guo_hall, median_width_px};
 use accurate_synth::{CaseOptions, Family, generate};
 use accurate_traverse::{
     GraphParams, SkeletonGraph, Walk, WalkEnd, WalkParams, fill_small_holes, k_best_walks,
@@ -74,7 +74,7 @@ fn view<V: View>(name: String, mask: &Array2<bool>, truth: &[Pixel<V>]) -> Outco
     let start = Instant::now();
     let filled = fill_small_holes(mask, GraphParams::hole_area_px(thickness));
     let filled = Mask::from_array(filled).expect("a mask");
-    let thin = zhang_suen(&filled);
+    let thin = guo_hall(&filled);
     let radii = distance_to_background(&filled).expect("background");
     let prepared = start.elapsed();
     let graph: SkeletonGraph<V> =

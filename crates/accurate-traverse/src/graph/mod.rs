@@ -1,5 +1,6 @@
 //! A skeleton as a graph of smooth edges between tips and junctions.
 
+mod ends;
 mod fill;
 mod links;
 mod params;
@@ -117,6 +118,7 @@ impl<V: View> SkeletonGraph<V> {
         if rough.edges.is_empty() {
             return Err(TraverseError::NoEdge { view, pixels });
         }
+        ends::extend_tips(&mut rough, radii, mask_thickness_px);
         let mut number = vec![None; rough.nodes.len()];
         let mut nodes: Vec<GraphNode<V>> = Vec::new();
         let mut edges = Vec::with_capacity(rough.edges.len());
@@ -132,6 +134,14 @@ impl<V: View> SkeletonGraph<V> {
             let (points, radii) =
                 smooth::smooth(&edge.points, &edge.radii, params.smooth_sigma_px)?;
             edges.push(GraphEdge::body(ends, points.into_iter().map(Pixel::from).collect(), radii));
+        }
+        let tips: Vec<[bool; 2]> =
+            edges.iter().map(|edge| edge.ends.map(|node| nodes[node].is_tip())).collect();
+        ends::stretch(&mut edges, &tips, radii, mask_thickness_px);
+        for (edge, tips) in edges.iter().zip(&tips) {
+            for side in (0..2).filter(|&side| tips[side]) {
+                nodes[edge.ends[side]].at = edge.from_end(side, 0).into();
+            }
         }
         links::add(&mut nodes, &mut edges, params);
         Ok(Self { nodes, edges, mask_thickness_px })

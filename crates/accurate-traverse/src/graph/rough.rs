@@ -73,7 +73,7 @@ impl RoughGraph {
         }
     }
 
-    fn degrees(&self) -> Vec<usize> {
+    pub fn degrees(&self) -> Vec<usize> {
         let mut degree = vec![0; self.nodes.len()];
         for edge in &self.edges {
             edge.ends.iter().for_each(|&node| degree[node] += 1);

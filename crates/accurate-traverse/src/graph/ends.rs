@@ -1,0 +1,206 @@
+//! Thinning stops short of the tips of the body and of the turning points of hairpins. Here the
+//! graph gets them back from the mask.
+
+use accurate_geom::{Pixel, Point2, View};
+use nalgebra::Vector2;
+use ndarray::Array2;
+
+use super::GraphEdge;
+use super::rough::RoughGraph;
+
+/// The longest stretch put back, px. Thinning takes at most a few pixels more than half a thickness.
+const MAX_STRETCH_PX: f64 = 16.0;
+
+/// Part of a tip's edge that gives its direction, px.
+const TANGENT_PX: usize = 8;
+
+/// Nearest pixel of the mask: where the distance to the background is not 0.
+fn inside(radii: &Array2<f64>, at: Point2) -> bool {
+    // Negative and huge values saturate and fall outside; so does -1 after rounding.
+    let (x, y) = (at.x.round(), at.y.round());
+    x >= 0.0 && y >= 0.0 && radii.get((y as usize, x as usize)).is_some_and(|&r| r > 0.0)
+}
+
+/// Draws every tip out along its tangent until it is half a thickness from where the mask ends.
+pub(super) fn extend_tips(graph: &mut RoughGraph, radii: &Array2<f64>, mask_thickness_px: f64) {
+    let degree = graph.degrees();
+    for edge in &mut graph.edges {
+        for side in 0..2 {
+            let node = edge.ends[side];
+            if degree[node] != 1 {
+                continue;
+            }
+            if side == 0 {
+                edge.points.reverse();
+                edge.radii.reverse();
+            }
+            let last = edge.points.len() - 1;
+            let (tip, radius) = (edge.points[last], edge.radii[last]);
+            let ahead = tip - edge.points[last.saturating_sub(TANGENT_PX)];
+            if let Some(ahead) = ahead.try_normalize(0.0) {
+                let mut free = 0.0;
+                while free < MAX_STRETCH_PX && inside(radii, tip + ahead * (free + 0.25)) {
+                    free += 0.25;
+                }
+                let stretch = free - mask_thickness_px / 2.0;
+                if stretch > 0.0 {
+                    let steps = stretch.ceil() as usize;
+                    for k in 1..=steps {
+                        let at = tip + ahead * (stretch * k as f64 / steps as f64);
+                        edge.points.push(at);
+                        edge.radii.push(radius);
+                    }
+                    graph.nodes[node] = tip + ahead * stretch;
+                    edge.length += stretch;
+                }
+            }
+            if side == 0 {
+                edge.points.reverse();
+                edge.radii.reverse();
+            }
+        }
+    }
+}
+
+/// Draws edges out into parts of the mask that lie too far from all of them: the turning points of
+/// hairpins, and tips that bend away from their tangent.
+///
+/// Two merged strands reach at most a thickness from the middle; only what is farther counts.
+pub(super) fn stretch<V: View>(
+    edges: &mut [GraphEdge<V>],
+    tips: &[[bool; 2]],
+    radii: &Array2<f64>,
+    mask_thickness_px: f64,
+) {
+    let reach = mask_thickness_px + 0.5;
+    for piece in far_pieces(edges, radii, reach) {
+        // The farthest pixel of the piece and what it is nearest to.
+        let mut target: Option<(f64, Point2, usize, usize)> = None;
+        for at in piece {
+            let Some((distance, edge, index)) = nearest(edges, at) else { continue };
+            if target.is_none_or(|(farthest, ..)| distance > farthest) {
+                target = Some((distance, at, edge, index));
+            }
+        }
+        let Some((distance, pixel, edge, index)) = target else { continue };
+        if distance > MAX_STRETCH_PX {
+            continue;
+        }
+        let line = &mut edges[edge];
+        let last = line.points.len() - 1;
+        let from = line.points[index].point();
+        let to = pixel + (from - pixel) * (0.5 * mask_thickness_px / distance);
+        if (index == 0 && tips[edge][0]) || (index == last && tips[edge][1]) {
+            draw_out(line, index == 0, to);
+        } else if turns_at(line, index, (to - from) / (to - from).norm()) {
+            bump(line, index, to - from);
+        }
+        line.length_px = line.points.windows(2).map(|w| w[0].distance(w[1])).sum();
+    }
+}
+
+/// 8-connected pieces of the mask farther than `reach` from every point of every edge.
+fn far_pieces<V: View>(
+    edges: &[GraphEdge<V>],
+    radii: &Array2<f64>,
+    reach: f64,
+) -> Vec<Vec<Point2>> {
+    let (height, width) = radii.dim();
+    let mut done = Array2::from_elem((height, width), false);
+    for point in edges.iter().flat_map(|edge| &edge.points) {
+        for y in covered(point.y, reach, height) {
+            for x in covered(point.x, reach, width) {
+                if (x as f64 - point.x).powi(2) + (y as f64 - point.y).powi(2) <= reach * reach {
+                    done[[y, x]] = true;
+                }
+            }
+        }
+    }
+    let mut pieces = Vec::new();
+    for ((y, x), &radius) in radii.indexed_iter() {
+        if !(radius > 0.0) || done[[y, x]] {
+            continue;
+        }
+        let mut piece = vec![(y, x)];
+        done[[y, x]] = true;
+        let mut next = 0;
+        while let Some(&(y, x)) = piece.get(next) {
+            next += 1;
+            for r in y.saturating_sub(1)..=(y + 1).min(height - 1) {
+                for c in x.saturating_sub(1)..=(x + 1).min(width - 1) {
+                    if radii[[r, c]] > 0.0 && !done[[r, c]] {
+                        done[[r, c]] = true;
+                        piece.push((r, c));
+                    }
+                }
+            }
+        }
+        pieces.push(piece.into_iter().map(|(y, x)| Point2::new(x as f64, y as f64)).collect());
+    }
+    pieces
+}
+
+fn covered(centre: f64, reach: f64, count: usize) -> std::ops::Range<usize> {
+    let low = (centre - reach).ceil().max(0.0) as usize;
+    let high = (centre + reach).floor().max(-1.0) + 1.0;
+    low.min(count)..(high as usize).min(count).max(low.min(count))
+}
+
+fn nearest<V: View>(edges: &[GraphEdge<V>], at: Point2) -> Option<(f64, usize, usize)> {
+    let mut best: Option<(f64, usize, usize)> = None;
+    for (edge, line) in edges.iter().enumerate() {
+        for (index, point) in line.points.iter().enumerate() {
+            let distance = (point.point() - at).norm();
+            if best.is_none_or(|(least, ..)| distance < least) {
+                best = Some((distance, edge, index));
+            }
+        }
+    }
+    best
+}
+
+/// Appends a straight piece to a tip.
+fn draw_out<V: View>(line: &mut GraphEdge<V>, at_start: bool, to: Point2) {
+    if at_start {
+        line.points.reverse();
+        line.radii.reverse();
+    }
+    let last = line.points.len() - 1;
+    let (from, radius) = (line.points[last].point(), line.radii[last]);
+    let steps = (to - from).norm().ceil().max(1.0) as usize;
+    for k in 1..=steps {
+        line.points.push(Pixel::from(from + (to - from) * (k as f64 / steps as f64)));
+        line.radii.push(radius);
+    }
+    if at_start {
+        line.points.reverse();
+        line.radii.reverse();
+    }
+}
+
+/// Whether both arms of the line at `index` point away from `outward`: a hairpin turns there.
+fn turns_at<V: View>(line: &GraphEdge<V>, index: usize, outward: Vector2<f64>) -> bool {
+    const ARM_PX: usize = 8;
+    let last = line.points.len() - 1;
+    let at = line.points[index].point();
+    let back = |k: usize| {
+        let arm = line.points[k].point() - at;
+        arm.dot(&outward) < -0.7 * arm.norm()
+    };
+    index >= ARM_PX && index + ARM_PX <= last && back(index - ARM_PX) && back(index + ARM_PX)
+}
+
+/// Moves point `index` by `shift` and its neighbours less and less; the nodes stay.
+fn bump<V: View>(line: &mut GraphEdge<V>, index: usize, shift: Vector2<f64>) {
+    // As wide as the hairpin is deep, about: then the arms stay apart as the mask has them.
+    let sigma = shift.norm().max(2.0);
+    let last = line.points.len() - 1;
+    for (k, point) in line.points.iter_mut().enumerate() {
+        if k == 0 || k == last {
+            continue;
+        }
+        let away = (k as f64 - index as f64) / sigma;
+        let moved = point.point() + shift * (-0.5 * away * away).exp();
+        *point = moved.into();
+    }
+}
