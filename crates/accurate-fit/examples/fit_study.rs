@@ -94,8 +94,21 @@ fn main() {
             )
             .unwrap();
             let t0 = Instant::now();
-            let fit =
-                fit_outlines(&curve, &OutlinePair::new(&one, &two), &case.rig, &params).unwrap();
+            let pair = OutlinePair::new(&one, &two);
+            let rounds: usize = get("rounds", "0").parse().unwrap();
+            let mut ap = AdaptiveParams::DEFAULT;
+            ap.rounds = rounds;
+            if let Ok(v) = get("window", "").parse() {
+                ap.window_px = v;
+            }
+            if let Ok(v) = get("var", "").parse() {
+                ap.noise_inflation = v;
+            }
+            let fit = if rounds == 0 {
+                fit_outlines(&curve, &pair, &case.rig, &params).unwrap()
+            } else {
+                fit_outlines_adaptively(&curve, &pair, &case.rig, &params, &ap).unwrap()
+            };
             let dt = t0.elapsed().as_secs_f64() * 1e3;
             let pts = fit.curve.sample(1500);
             let (ov, mx) = compare(&pts, &case.truth);

@@ -113,5 +113,5 @@ impl Chords {
 /// side only of a vertical strand, whose points alternate left and right.
 #[inline]
 pub(crate) fn is_sampled(i: usize, stride: usize) -> bool {
-    (((i as u32).wrapping_mul(2_654_435_769)) >> 16) as usize % stride == 0
+    ((i as u32).wrapping_mul(2_654_435_769) >> 16).is_multiple_of(stride as u32)
 }

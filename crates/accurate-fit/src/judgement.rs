@@ -82,7 +82,7 @@ pub(crate) fn judge(problem: &OutlineProblem<'_>, e: &Evaluation) -> Judgement {
     }
     let mut chi = 0.0;
     let mut used = [0; 2];
-    for row in e.rows.iter().filter(|row| !row.outside) {
+    for row in e.rows.iter().filter(|row| row.passes && !row.outside) {
         let r = row.distance - e.state.half_px[row.view];
         chi += (r * r).min(4.0);
         used[row.view] += 1;

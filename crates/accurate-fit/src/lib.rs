@@ -1,8 +1,10 @@
 //! One 3D B-spline fitted to both views: to two outlines or to two ordered curves.
 
+mod adaptive;
 mod boundary_fit;
 mod bucket_grid;
 mod chords;
+mod covariance;
 mod curve;
 mod distance_map;
 mod error;
@@ -10,11 +12,20 @@ mod judgement;
 mod minimise;
 mod normal;
 mod outline;
+mod outline_params;
 mod outline_problem;
+mod pose;
 mod projector;
+mod selected_inverse;
+mod start;
 mod uniform_spline;
 
-pub use boundary_fit::{OutlineFit, OutlineFitParams, OutlinePair, fit_outlines, judge_curve};
+pub use adaptive::{AdaptiveParams, fit_outlines_adaptively};
+pub use boundary_fit::{OutlineFit, fit_outlines, judge_curve};
+pub use covariance::CurveCovariance;
 pub use error::FitError;
 pub use judgement::{Judgement, UnexplainedStretch};
 pub use outline::{BoundaryPoint, Outline};
+pub use outline_params::OutlineFitParams;
+pub use pose::OutlinePair;
+pub use start::start_curve;

@@ -25,7 +25,7 @@ pub(crate) struct Priors {
 /// A half thickness may leave its first guess by this factor at most: what is beyond is a strand
 /// that explains two.
 const HALF_RANGE: f64 = 1.7;
-const DAMPING: [f64; 2] = [1e-5, 1e3];
+const DAMPING: [f64; 2] = [1e-4, 1e3];
 
 impl<'a> Minimiser<'a> {
     pub(crate) fn new(
@@ -53,6 +53,7 @@ impl<'a> Minimiser<'a> {
             .evaluated
             .is_some_and(|was| was.stride == settings.stride && was.reach_px == settings.reach_px);
         if !fresh {
+            self.current.precision = Default::default();
             self.problem.evaluate(&mut self.current, settings)?;
         }
         self.evaluated = Some(*settings);
@@ -90,6 +91,9 @@ impl<'a> Minimiser<'a> {
     /// One accepted step, or none if no damping makes the cost smaller. Returns the relative drop
     /// of the cost.
     pub(crate) fn step(&mut self, settings: &Settings) -> Result<f64, FitError> {
+        self.refresh(settings)?;
+        // Fixed during the step: costs before and after must be sums with the same weights.
+        self.problem.renew_data(&mut self.current, &mut self.trial.precision);
         let before = self.cost(settings)?;
         self.assemble(settings)?;
         let with_nuisance = self.normal.globals() == 5;

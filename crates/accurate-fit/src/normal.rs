@@ -3,13 +3,17 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 
 use crate::FitError;
+use crate::selected_inverse::SelectedInverse;
+
+/// Third difference of four control points.
+pub(crate) const THIRD_DIFFERENCE: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
 
 /// Normal equations of a uniform cubic spline (three unknowns per control point) and a few global
 /// unknowns behind them: `(H + damping) step = -gradient`.
@@ -166,16 +170,31 @@ impl NormalEquations {
 
     /// Adds half of `lambda2 |D2 c|² + lambda3 |D3 c|²`, second and third differences of the control
     /// points.
-    pub(crate) fn add_smoothness(&mut self, control: &[Vector3<f64>], lambda2: f64, lambda3: f64) {
-        self.add_difference(control, &[1.0, -2.0, 1.0], lambda2);
-        self.add_difference(control, &[-1.0, 3.0, -3.0, 1.0], lambda3);
+    ///
+    /// `local[k]`, if there, multiplies `lambda3` at the differences of control points `k..k + 4`.
+    pub(crate) fn add_smoothness(
+        &mut self,
+        control: &[Vector3<f64>],
+        lambda2: f64,
+        lambda3: f64,
+        local: &[f64],
+    ) {
+        self.add_difference(control, &[1.0, -2.0, 1.0], lambda2, &[]);
+        self.add_difference(control, &THIRD_DIFFERENCE, lambda3, local);
     }
 
-    fn add_difference(&mut self, control: &[Vector3<f64>], stencil: &[f64], lambda: f64) {
+    fn add_difference(
+        &mut self,
+        control: &[Vector3<f64>],
+        stencil: &[f64],
+        lambda: f64,
+        local: &[f64],
+    ) {
         if lambda == 0.0 {
             return;
         }
         for (first, window) in control.windows(stencil.len()).enumerate() {
+            let lambda = lambda * local.get(first).copied().unwrap_or(1.0);
             let mut difference = Vector3::zeros();
             for (c, s) in window.iter().zip(stencil) {
                 difference += c * *s;
@@ -192,7 +211,7 @@ impl NormalEquations {
         }
     }
 
-    /// Factorises `H + damping * diag(H)`.
+    /// Factorises `H + damping * diag(H)`, the diagonal averaged over each control point.
     pub(crate) fn factorise(&mut self, damping: f64) -> Result<Factor<'_>, FitError> {
         let unknowns = self.unknowns();
         let singular = FitError::Singular { unknowns };
@@ -204,10 +223,19 @@ impl NormalEquations {
         if !(largest > 0.0 && largest.is_finite()) {
             return Err(singular);
         }
+        let controls = 3 * self.controls;
         for column in 0..unknowns {
-            let diagonal = &mut self.damped[self.base[column].wrapping_add(column)];
+            let diagonal = |c: usize| self.values[self.base[c].wrapping_add(c)];
+            // The mean over the three coordinates: the same in every frame of the world.
+            let size = if column < controls {
+                let first = column - column % 3;
+                (diagonal(first) + diagonal(first + 1) + diagonal(first + 2)) / 3.0
+            } else {
+                diagonal(column)
+            };
             // An unknown that no residual sees must still have a pivot.
-            *diagonal += damping * diagonal.max(1e-9 * largest);
+            self.damped[self.base[column].wrapping_add(column)] +=
+                damping * size.max(1e-9 * largest);
         }
         let matrix = SparseColMatRef::new(self.pattern.as_ref(), self.damped.as_slice());
         let stack = MemStack::new(&mut self.memory);
@@ -281,6 +309,19 @@ impl<'a> Factor<'a> {
             Par::Seq,
             stack,
         );
+    }
+
+    /// The inverse of the damped matrix, where the factor has entries.
+    pub(crate) fn selected_inverse(&self) -> Result<SelectedInverse, FitError> {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(l) => {
+                Ok(SelectedInverse::new(l.col_ptr(), l.row_idx(), self.factor))
+            }
+            // Never chosen: see the constructor.
+            SymbolicCholeskyRaw::Supernodal(_) => {
+                Err(FitError::Singular { unknowns: self.gradient.len() })
+            }
+        }
     }
 
     fn into_step(mut self) -> &'a [f64] {

@@ -1,4 +1,4 @@
-use accurate_geom::nalgebra::{RowVector3, Vector2};
+use accurate_geom::nalgebra::{RowVector3, Vector2, Vector3};
 
 use crate::FitError;
 use crate::chords::{Chords, Nearest, is_sampled};
@@ -43,7 +43,14 @@ pub(crate) struct Row {
     /// Derivatives with respect to the shift and the roll of view 2.
     pub(crate) nuisance: [f64; 3],
     pub(crate) distance: f64,
+    /// Weight by how exactly digitisation places the point, 1 on average.
     pub(crate) precision: f64,
+    /// Whether the gates let it be a datum of this state ...
+    pub(crate) passes: bool,
+    /// ... and whether it is one of the step being tried.
+    pub(crate) held: bool,
+    /// Cosine between the pixel pair's axis and the curve's normal.
+    pub(crate) share: f64,
     /// Curve samples outside the mask have a fixed weight and no half thickness.
     pub(crate) outside: bool,
     /// Index of the outline point.
@@ -55,9 +62,12 @@ pub(crate) struct Row {
 pub(crate) struct Evaluation {
     pub(crate) state: State,
     pub(crate) rows: Vec<Row>,
-    /// Outline points looked at that gave no row, by view.
-    pub(crate) left_out: [usize; 2],
+    /// Data of the step being tried that are out of reach now.
+    pub(crate) lost: usize,
     pub(crate) nearest: [Vec<Nearest>; 2],
+    /// If not empty: the precisions of the outline points that are data of the step being tried;
+    /// not positive for the others.
+    pub(crate) precision: [Vec<f64>; 2],
     pub(crate) chords: [Chords; 2],
 }
 
@@ -71,7 +81,8 @@ pub(crate) struct OutlineProblem<'a> {
     /// Chords per span: about 1.5 px each.
     pub(crate) steps: usize,
     pub(crate) px_per_unit: f64,
-    pub(crate) floor: f64,
+    /// Factors of `lambda3` along the curve; empty: 1 everywhere.
+    pub(crate) local_smoothness: Vec<f64>,
 }
 
 /// Distances beyond which a curve sample outside the mask is left alone, and within which it is
@@ -84,6 +95,8 @@ const BRIDGE_HALF_PX: f64 = 4.0;
 const MIN_COSINE: f64 = 0.2;
 /// ... or if it lies deeper in the body than this fraction of the half thickness.
 const MIN_DEPTH: f64 = 0.3;
+/// Variance of a boundary point besides digitisation, px²: 0.07 px rendering and model error.
+const OTHER_VARIANCE: f64 = 0.005;
 /// Residuals are looked for at least so far for [`Judgement`](crate::Judgement), px.
 pub(crate) const JUDGED_PX: f64 = 4.8;
 
@@ -92,8 +105,9 @@ impl OutlineProblem<'_> {
         Evaluation {
             state,
             rows: Vec::new(),
-            left_out: [0; 2],
+            lost: 0,
             nearest: Default::default(),
+            precision: Default::default(),
             chords: Default::default(),
         }
     }
@@ -101,6 +115,7 @@ impl OutlineProblem<'_> {
     /// Recomputes association and residuals of `e.state`.
     pub(crate) fn evaluate(&self, e: &mut Evaluation, settings: &Settings) -> Result<(), FitError> {
         e.rows.clear();
+        e.lost = 0;
         for view in 0..2 {
             let mut projector = self.projectors[view].clone();
             if view == 1 {
@@ -111,30 +126,60 @@ impl OutlineProblem<'_> {
             let radius = half + settings.reach_px.max(JUDGED_PX);
             let outline = self.outlines[view];
             e.chords[view].nearest(outline, radius, settings.stride, &mut e.nearest[view]);
-            e.left_out[view] = self.boundary_rows(e, view, &projector, settings);
+            self.boundary_rows(e, view, &projector, settings);
             self.outside_rows(e, view, &projector);
         }
         Ok(())
     }
 
-    /// Adds the rows of one view's outline; returns how many points looked at gave none.
+    /// How exactly digitisation places a boundary point whose pixel pair makes an angle of cosine
+    /// `share` with the curve's normal: the inverse of its variance `share² / 12`, with a floor for
+    /// what is not digitisation, relative to the mean variance 1/18.
+    fn precision(&self, view: usize, share: f64) -> f64 {
+        if self.outlines[view].digitised {
+            (1.0 / 18.0 + OTHER_VARIANCE) / (share * share / 12.0 + OTHER_VARIANCE)
+        } else {
+            1.0
+        }
+    }
+
+    /// Makes every row that passes the gates, and no other, a datum, with the precision of its own
+    /// normal, and notes that in `precision`.
+    pub(crate) fn renew_data(&self, e: &mut Evaluation, precision: &mut [Vec<f64>; 2]) {
+        for view in 0..2 {
+            precision[view].clear();
+            precision[view].resize(e.nearest[view].len(), 0.0);
+        }
+        e.rows.retain(|row| row.passes);
+        e.lost = 0;
+        for row in &mut e.rows {
+            row.held = true;
+            if !row.outside {
+                row.precision = self.precision(row.view, row.share);
+                precision[row.view][row.point] = row.precision;
+            }
+        }
+    }
+
+    /// Adds the rows of one view's outline.
     fn boundary_rows(
         &self,
         e: &mut Evaluation,
         view: usize,
         projector: &Projector,
         settings: &Settings,
-    ) -> usize {
+    ) {
         let half = e.state.half_px[view];
         let spline = &e.state.spline;
         let end = spline.spans() as f64;
-        let mut left_out = 0;
+        let trying = !e.precision[view].is_empty();
         for (i, near) in e.nearest[view].iter_mut().enumerate() {
             if settings.stride > 1 && !is_sampled(i, settings.stride) {
                 continue;
             }
+            let known = if trying { e.precision[view][i] } else { 0.0 };
             if !(near.squared < (half + settings.reach_px).powi(2)) {
-                left_out += 1;
+                e.lost += usize::from(known > 0.0);
                 continue;
             }
             let [bx, by, inward_x, inward_y] = self.outlines[view].points[i];
@@ -153,21 +198,23 @@ impl OutlineProblem<'_> {
             let distance = out.norm();
             *near = Nearest { squared: distance * distance, u };
             let outward = -(out.x * inward_x + out.y * inward_y);
-            if !(distance > MIN_DEPTH * half
+            let passes = distance > MIN_DEPTH * half
                 && distance < half + settings.reach_px
-                && outward > MIN_COSINE * distance)
-            {
-                left_out += 1;
+                && outward > MIN_COSINE * distance;
+            let held = if trying { known > 0.0 } else { passes };
+            if !(passes || held) {
                 continue;
             }
-            e.rows.push(row(spline, view, projector, u, &p, &jacobian, out / distance, distance));
-            if let Some(row) = e.rows.last_mut() {
-                row.point = i;
-                let share = outward / distance;
-                row.precision = (1.0 / 18.0 + self.floor) / (share * share / 12.0 + self.floor);
-            }
+            // On the curve itself no direction is better than another.
+            let towards = if distance > 0.0 { out / distance } else { Vector2::zeros() };
+            let mut row = row(spline, view, projector, u, &p, &jacobian, towards, distance);
+            row.point = i;
+            row.passes = passes;
+            row.held = held;
+            row.share = outward / distance;
+            row.precision = if known > 0.0 { known } else { self.precision(row.view, row.share) };
+            e.rows.push(row);
         }
-        left_out
     }
 
     /// Adds the rows of curve samples outside one view's mask, about one per chord.
@@ -220,17 +267,20 @@ impl OutlineProblem<'_> {
         let robust = |r: f64| squared_scale * (r * r / squared_scale).ln_1p();
         let factor = settings.stride as f64;
         let mut sum = 0.0;
-        for row in &e.rows {
+        for row in e.rows.iter().filter(|row| row.held) {
             sum += if row.outside {
                 self.outside_weight(e, row.view, settings) * row.distance * row.distance
             } else {
-                factor
-                    * robust((row.distance - e.state.half_px[row.view]) * row.precision.sqrt())
+                factor * robust((row.distance - e.state.half_px[row.view]) * row.precision.sqrt())
             };
         }
-        let left_out = (e.left_out[0] + e.left_out[1]) as f64;
-        sum += factor * left_out * robust(settings.reach_px);
-        sum + smoothness(&e.state.spline, settings.lambda2, settings.lambda3)
+        sum += factor * e.lost as f64 * robust(settings.reach_px);
+        sum + smoothness(
+            &e.state.spline,
+            settings.lambda2,
+            settings.lambda3,
+            &self.local_smoothness,
+        )
     }
 
     fn outside_weight(&self, e: &Evaluation, view: usize, settings: &Settings) -> f64 {
@@ -251,7 +301,7 @@ impl OutlineProblem<'_> {
         let factor = settings.stride as f64;
         let outside = [0, 1].map(|view| self.outside_weight(e, view, settings));
         let globals = normal.globals();
-        for row in &e.rows {
+        for row in e.rows.iter().filter(|row| row.held) {
             let mut global = [0.0; 5];
             global[2..].copy_from_slice(&row.nuisance);
             let (residual, weight) = if row.outside {
@@ -270,7 +320,12 @@ impl OutlineProblem<'_> {
                 weight,
             );
         }
-        normal.add_smoothness(&e.state.spline.control, settings.lambda2, settings.lambda3);
+        normal.add_smoothness(
+            &e.state.spline.control,
+            settings.lambda2,
+            settings.lambda3,
+            &self.local_smoothness,
+        );
     }
 }
 
@@ -301,15 +356,107 @@ fn row(
         nuisance,
         distance,
         precision: 1.0,
+        passes: true,
+        held: true,
+        share: 1.0,
         outside: false,
         point: usize::MAX,
     }
 }
 
-/// `lambda2 |D2 c|² + lambda3 |D3 c|²`.
-pub(crate) fn smoothness(spline: &UniformSpline, lambda2: f64, lambda3: f64) -> f64 {
+/// `lambda2 |D2 c|² + lambda3 |D3 c|²`, the latter with the local factors.
+pub(crate) fn smoothness(spline: &UniformSpline, lambda2: f64, lambda3: f64, local: &[f64]) -> f64 {
     let c = &spline.control;
     let second: f64 = c.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).norm_squared()).sum();
-    let third: f64 = c.windows(4).map(|w| (w[3] - w[0] + 3.0 * (w[1] - w[2])).norm_squared()).sum();
+    let third: f64 = (0..c.len() - 3)
+        .map(|k| {
+            let factor = local.get(k).copied().unwrap_or(1.0);
+            factor * third_difference(c, k).norm_squared()
+        })
+        .sum();
     lambda2 * second + lambda3 * third
+}
+
+/// `c[k + 3] - 3 c[k + 2] + 3 c[k + 1] - c[k]`.
+pub(crate) fn third_difference(c: &[Vector3<f64>], k: usize) -> Vector3<f64> {
+    c[k + 3] - c[k] + 3.0 * (c[k + 1] - c[k + 2])
+}
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::{Curve3, View1, View2};
+    use accurate_synth::{CaseOptions, Family, generate};
+
+    use super::*;
+    use crate::pose::pose;
+    use crate::{Outline, OutlinePair};
+
+    /// Half the cost is what `assemble` differentiates: by the envelope theorem the motion of the
+    /// nearest points does not count, and neither does that of the weights' normals, which are held.
+    #[test]
+    fn the_gradient_is_the_derivative_of_the_cost_in_every_unknown() {
+        // C-arm rigs have f_y < 0.
+        for (family, index) in [(Family::Medium, 0), (Family::Carm, 1), (Family::SimPaper, 4)] {
+            let case = generate(family, 1900, index, &CaseOptions::default()).unwrap();
+            let one = Outline::<View1>::from_mask(case.masks[0].view()).unwrap();
+            let two = Outline::<View2>::from_mask(case.masks[1].view()).unwrap();
+            let pair = OutlinePair::new(&one, &two);
+            let points: Vec<_> = case.truth.iter().step_by(25).copied().collect();
+            let truth = Curve3::interpolate(&points).unwrap();
+            let (problem, mut spline) = pose(&truth, &pair, &case.rig, 10.0).unwrap();
+            for (k, c) in spline.control.iter_mut().enumerate() {
+                // Half a px off, so that there is a gradient.
+                c.y += 0.5 / problem.px_per_unit * (k as f64).sin();
+            }
+            let settings = Settings {
+                reach_px: 3.0,
+                scale_px: 0.7,
+                stride: 1,
+                lambda2: 0.1 * problem.px_per_unit.powi(2),
+                lambda3: 0.3 * problem.px_per_unit.powi(2),
+                outside_weight: 0.0,
+            };
+            let nuisance = Nuisance { shift_px: [0.2, -0.1], roll: 1e-3 };
+            let state = State { spline, half_px: [1.0, 1.2], nuisance };
+            let mut e = problem.evaluation(state);
+            problem.evaluate(&mut e, &settings).unwrap();
+            let mut trial = problem.evaluation(e.state.clone());
+            problem.renew_data(&mut e, &mut trial.precision);
+            let controls = e.state.spline.control.len();
+            let mut normal = NormalEquations::new(controls, 5).unwrap();
+            problem.assemble(&e, &settings, &mut normal);
+            let analytic = normal.gradient().to_vec();
+
+            let mut cost_at = |unknown: usize, offset: f64| {
+                trial.state.clone_from(&e.state);
+                let s = &mut trial.state;
+                match unknown.checked_sub(3 * controls) {
+                    None => s.spline.control[unknown / 3][unknown % 3] += offset,
+                    Some(view @ (0 | 1)) => s.half_px[view] += offset,
+                    Some(axis @ (2 | 3)) => s.nuisance.shift_px[axis - 2] += offset,
+                    Some(_) => s.nuisance.roll += offset,
+                }
+                problem.evaluate(&mut trial, &settings).unwrap();
+                0.5 * problem.cost(&trial, &settings)
+            };
+            for (unknown, &gradient) in analytic.iter().enumerate() {
+                // A move of 0.003 px; the roll acts at an arm of about 200 px.
+                let h = match unknown.checked_sub(3 * controls) {
+                    None => 0.003 / problem.px_per_unit,
+                    Some(4) => 1.5e-5,
+                    Some(_) => 0.003,
+                };
+                let numeric = (cost_at(unknown, h) - cost_at(unknown, -h)) / (2.0 * h);
+                // Per px of motion a control point moves some 50 boundary points by up to 1 px each.
+                // Those whose nearest point jumps to another strand within the step, and the second
+                // order of the parameter step, are allowed 2 % of that scale.
+                let scale = 0.003 / h * if unknown < 3 * controls { 50.0 } else { 1000.0 };
+                assert!(
+                    (numeric - gradient).abs() < 0.02 * scale + 0.02 * gradient.abs(),
+                    "{family} unknown {unknown} of {}: {numeric} {gradient}",
+                    analytic.len()
+                );
+            }
+        }
+    }
 }

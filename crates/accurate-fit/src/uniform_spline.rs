@@ -47,8 +47,13 @@ impl UniformSpline {
     /// Span and offset of the parameter `u`, which is first cut to the curve.
     #[inline]
     pub(crate) fn locate(&self, u: f64) -> (usize, f64) {
-        let spans = self.spans();
-        let u = u.clamp(0.0, spans as f64);
+        Self::locate_in(self.spans(), u)
+    }
+
+    /// The same for any spline of so many spans. NaN counts as the start.
+    #[inline]
+    pub(crate) fn locate_in(spans: usize, u: f64) -> (usize, f64) {
+        let u = u.max(0.0).min(spans as f64);
         let span = (u as usize).min(spans - 1);
         (span, u - span as f64)
     }
@@ -115,7 +120,7 @@ impl UniformSpline {
                 normal.add(span, &row, &gradient, -point[axis], 1.0);
             }
         }
-        normal.add_smoothness(&spline.control, lambda2, lambda3);
+        normal.add_smoothness(&spline.control, lambda2, lambda3, &[]);
         let step = normal.solve(1e-9)?;
         spline.add(step);
         Ok(spline)

@@ -2,6 +2,7 @@ use accurate_match::CurveReconstruction;
 use serde::Serialize;
 
 use crate::Traces;
+use crate::robust::JointResult;
 
 /// How far a reconstruction can be trusted, without knowing the truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -21,9 +22,46 @@ pub struct Diagnostics {
     pub view2_reversed: bool,
     /// Matched pairs whose rays gave no finite point.
     pub dropped_pairs: usize,
+    /// How well the curve explains both outlines, where it was fitted to them.
+    pub outline: Option<OutlineDiagnostics>,
+}
+
+/// How well a fitted curve explains the outlines of both masks.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct OutlineDiagnostics {
+    /// Outline that the curve does not explain; 0 at the truth.
+    pub unexplained: f64,
+    /// Curve that the masks do not show; 0 at the truth.
+    pub outside: f64,
+    /// Mean squared residual of the boundary points, px²; 1/18 at the truth.
+    pub chi_per_point: f64,
+    /// By how much the best curve from another pair of walks is worse; none if there is no other.
+    pub margin: Option<f64>,
+    /// Pairs of walks that were fitted.
+    pub fits: usize,
 }
 
 impl Diagnostics {
+    pub(crate) fn of_joint(result: &JointResult) -> Self {
+        let judgement = &result.fit.judgement;
+        Self {
+            mean_epipolar_distance_px: result.mean_distance_px,
+            max_epipolar_distance_px: 0.0,
+            trace_coverage: result.coverage,
+            trace_jumps: [0; 2],
+            matched_fraction: [1.0; 2],
+            view2_reversed: false,
+            dropped_pairs: 0,
+            outline: Some(OutlineDiagnostics {
+                unexplained: judgement.unexplained,
+                outside: judgement.outside,
+                chi_per_point: judgement.chi_per_point(),
+                margin: result.margin.is_finite().then_some(result.margin),
+                fits: result.fits,
+            }),
+        }
+    }
+
     pub(crate) fn of(matched: &CurveReconstruction, traces: &Traces) -> Self {
         let fraction = |mut indices: Vec<usize>, total: usize| {
             indices.sort_unstable();
@@ -46,6 +84,7 @@ impl Diagnostics {
             ],
             view2_reversed: traces.view2_reversed,
             dropped_pairs: matched.dropped,
+            outline: None,
         }
     }
 }

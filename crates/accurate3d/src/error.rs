@@ -1,6 +1,7 @@
 use std::fmt;
 
 use accurate_eval::EvalError;
+use accurate_fit::FitError;
 use accurate_match::MatchError;
 use accurate_seg::SegError;
 use accurate_synth::SynthError;
@@ -18,6 +19,8 @@ pub enum Stage {
     Traversal,
     /// Ordered curves to 3D.
     Matching,
+    /// One 3D curve to both views.
+    Fitting,
 }
 
 impl fmt::Display for Stage {
@@ -26,6 +29,7 @@ impl fmt::Display for Stage {
             Self::Segmentation => "segmentation",
             Self::Traversal => "traversal",
             Self::Matching => "matching",
+            Self::Fitting => "fitting",
         })
     }
 }
@@ -74,6 +78,27 @@ pub enum Error {
         /// What matching says.
         source: MatchError,
     },
+    /// No curve could be fitted to the outlines.
+    #[error("case {case}: {source}")]
+    Fitting {
+        /// Case id.
+        case: String,
+        /// What the fit says.
+        source: FitError,
+    },
+    /// No pair of walks through the two masks gives a curve.
+    #[error(
+        "case {case}: no pair of walks gives a curve ({} and {} walks, {pairs} pairs compared)",
+        walks[0], walks[1]
+    )]
+    NoCandidate {
+        /// Case id.
+        case: String,
+        /// Walks proposed in each view.
+        walks: [usize; 2],
+        /// Pairs whose ends agree.
+        pairs: usize,
+    },
     /// A name stands for nothing.
     #[error(transparent)]
     Name(#[from] UnknownName),
@@ -92,6 +117,8 @@ impl Error {
             Self::Segmentation { .. } | Self::NoNetwork { .. } => Some(Stage::Segmentation),
             Self::Traversal { .. } => Some(Stage::Traversal),
             Self::Matching { .. } => Some(Stage::Matching),
+            Self::Fitting { .. } => Some(Stage::Fitting),
+            Self::NoCandidate { .. } => Some(Stage::Matching),
             Self::MissingInput { .. } | Self::Name(_) | Self::Scoring(_) | Self::Synthesis(_) => {
                 None
             }

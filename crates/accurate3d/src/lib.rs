@@ -4,12 +4,13 @@
 //! [`reconstruct`] takes a [`ViewPair`] (a rig with ordered points, masks or images of both views)
 //! and returns a [`Reconstruction`]: the 3D curve with the pixels it came from and diagnostics.
 //! The stages meet only here; each is a crate of its own and is re-exported as a module:
-//! [`geom`], [`seg`], [`traverse`], [`matching`], [`baselines`], [`eval`], [`synth`], [`io`].
+//! [`geom`], [`seg`], [`traverse`], [`matching`], [`fit`], [`baselines`], [`eval`], [`synth`], [`io`].
 //!
 //! Research software: not for clinical use.
 
 pub use accurate_baselines as baselines;
 pub use accurate_eval as eval;
+pub use accurate_fit as fit;
 pub use accurate_geom as geom;
 pub use accurate_io as io;
 pub use accurate_match as matching;
@@ -25,6 +26,7 @@ mod pair;
 mod picture;
 mod reconstruct;
 mod reconstruction;
+mod robust;
 pub mod table;
 
 pub use diagnostics::Diagnostics;
@@ -34,6 +36,7 @@ pub use pair::ViewPair;
 pub use picture::picture_svg;
 pub use reconstruct::{Params, reconstruct};
 pub use reconstruction::{Reconstruction, Traces};
+pub use robust::RobustParams;
 
 /// The statement that stands in every report: this is research software.
 pub const NOT_FOR_CLINICAL_USE: &str = "Research software: not for clinical use.";

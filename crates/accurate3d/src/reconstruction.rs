@@ -3,6 +3,7 @@ use accurate_io::{Column, CurveTable};
 use accurate_match::CurvePoint;
 use accurate_traverse::Trace;
 
+use crate::robust::JointResult;
 use crate::{Diagnostics, InputKind, Method};
 
 /// A reconstructed 3D curve: at least one point, all finite.
@@ -96,6 +97,17 @@ impl Traces {
             points2.reverse();
         }
         Self { points1, points2, coverage: [1.0; 2], jumps: [0; 2], view2_reversed: reversed }
+    }
+
+    /// Walks that the joint choice settled on.
+    pub(crate) fn walked(result: JointResult) -> Self {
+        Self {
+            points1: result.walk1,
+            points2: result.walk2,
+            coverage: result.coverage,
+            jumps: [0; 2],
+            view2_reversed: false,
+        }
     }
 
     /// Curves that were traced from skeletons.

@@ -43,6 +43,7 @@ pub fn paper_rows() -> Vec<Row> {
         row("Fast3R", Mask, false, Some("fast3r"), NO_WEIGHTS),
         row("MonSter", Mask, true, Some("monster"), NO_WEIGHTS),
         row("ACCURATE (paper)", Mask, true, Some("ours-mask"), Run(Method::Paper)),
+        row("accurate (ours)", Mask, true, None, Run(Method::Accurate)),
         row("Baert et al., as tabled", Points, true, Some("baert"), Run(Method::BaertTable)),
         row("Baert et al., fair", Points, true, None, Run(Method::Baert)),
         row(

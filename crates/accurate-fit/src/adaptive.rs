@@ -1,0 +1,216 @@
+use accurate_geom::{Curve3, Rig};
+
+use crate::boundary_fit::{finish, run};
+use crate::judgement::judge;
+use crate::minimise::Minimiser;
+use crate::normal::THIRD_DIFFERENCE;
+use crate::outline_params::{SmoothnessScale, final_settings};
+use crate::outline_problem::{Settings, third_difference};
+use crate::pose::pose;
+use crate::selected_inverse::SelectedInverse;
+use crate::{FitError, OutlineFit, OutlineFitParams, OutlinePair};
+
+/// Parameters of [`fit_outlines_adaptively`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdaptiveParams {
+    /// Most updates of the smoothness.
+    pub rounds: usize,
+    /// Standard deviation of the window over which bending is pooled along the curve, px.
+    pub window_px: f64,
+    /// Variance of a residual in units of the 1/18 px² of one boundary point. Above 1 because
+    /// neighbouring boundary points repeat each other's digitisation error.
+    pub noise_inflation: f64,
+    /// How much more of the outline may become unexplained before the smoothing stops; in the
+    /// units of [`Judgement::unexplained`](crate::Judgement::unexplained).
+    pub max_unexplained: f64,
+    /// A curve that leaves more than `max_unexplained` is tried again with knots at half the
+    /// distance, but not closer than this, px.
+    pub min_knot_spacing_px: f64,
+}
+
+impl AdaptiveParams {
+    /// Tuned on generated wires of all families.
+    pub const DEFAULT: Self = Self {
+        rounds: 8,
+        window_px: 50.0,
+        noise_inflation: 3.0,
+        max_unexplained: 0.05,
+        min_knot_spacing_px: 4.0,
+    };
+
+    pub(crate) fn validate(&self) -> Result<(), FitError> {
+        for (name, value) in
+            [("window_px", self.window_px), ("noise_inflation", self.noise_inflation)]
+        {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(FitError::BadParameter { name, value });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// [`fit_outlines`](crate::fit_outlines), then as smooth as the outlines say the body is.
+///
+/// No fixed smoothness suits a J tip and a straight shaft, or a helix and a random curve. The third
+/// differences of the control points are taken as normal variables whose variance changes slowly
+/// along the curve; it is estimated together with the curve by expectation maximisation: the
+/// observed squares plus what the data leave uncertain, pooled over a window. Where a curve runs
+/// along the epipolar lines the data leave much uncertain, and the smoothness that its other
+/// components show carries the depth over.
+///
+/// # Errors
+/// As [`fit_outlines`](crate::fit_outlines).
+///
+/// # Source
+/// Dempster, Laird and Rubin, J. R. Statist. Soc. B 39, 1977, for the variance of random effects;
+/// the steps are doubled in the logarithm, which converges in half the rounds.
+///
+/// # Cost
+/// About twice [`fit_outlines`](crate::fit_outlines).
+pub fn fit_outlines_adaptively(
+    start: &Curve3,
+    outlines: &OutlinePair<'_>,
+    rig: &Rig,
+    params: &OutlineFitParams,
+    adaptive: &AdaptiveParams,
+) -> Result<OutlineFit, FitError> {
+    params.validate()?;
+    adaptive.validate()?;
+    let fitted = fit_with_knots(start, outlines, rig, params, adaptive)?;
+    let halved =
+        OutlineFitParams { knot_spacing_px: 0.5 * params.knot_spacing_px, ..params.settled() };
+    let unexplained = |fit: &OutlineFit| fit.judgement.unexplained + fit.judgement.outside;
+    if unexplained(&fitted) <= adaptive.max_unexplained
+        || halved.knot_spacing_px < adaptive.min_knot_spacing_px
+    {
+        return Ok(fitted);
+    }
+    // Perhaps it bends more than knots so far apart can.
+    let finer = fit_with_knots(&fitted.curve, outlines, rig, &halved, adaptive)?;
+    let gain = unexplained(&fitted) - unexplained(&finer);
+    Ok(if gain > adaptive.max_unexplained { finer } else { fitted })
+}
+
+fn fit_with_knots(
+    start: &Curve3,
+    outlines: &OutlinePair<'_>,
+    rig: &Rig,
+    params: &OutlineFitParams,
+    adaptive: &AdaptiveParams,
+) -> Result<OutlineFit, FitError> {
+    let (problem, spline) = pose(start, outlines, rig, params.knot_spacing_px)?;
+    let (mut minimiser, steps, converged) = run(problem, spline, params)?;
+    let (more, inverse) = smooth(&mut minimiser, params, adaptive)?;
+    let variance = adaptive.noise_inflation / 18.0;
+    finish(minimiser, params, steps + more, converged, Some((inverse, variance)))
+}
+
+/// Alternates smoothness and curve; returns the steps taken and the inverse of the final normal
+/// matrix.
+pub(crate) fn smooth(
+    minimiser: &mut Minimiser<'_>,
+    params: &OutlineFitParams,
+    adaptive: &AdaptiveParams,
+) -> Result<(usize, SelectedInverse), FitError> {
+    let spline = &minimiser.current.state.spline;
+    let scale = SmoothnessScale::new(spline, minimiser.problem.px_per_unit);
+    let windows = spline.control.len() - 3;
+    let spacing_px = spline.length(8) * minimiser.problem.px_per_unit / spline.spans() as f64;
+    let pool = Pool::new(adaptive.window_px / spacing_px, windows);
+    let settings = final_settings(params, &scale);
+    let variance = adaptive.noise_inflation / 18.0;
+
+    let mut factors = vec![1.0; windows];
+    minimiser.refresh(&settings)?;
+    let allowed =
+        judge(&minimiser.problem, &minimiser.current).unexplained + adaptive.max_unexplained;
+    let mut steps = 0;
+    // Doubled in the logarithm until that proves too bold.
+    let mut relaxation = 2;
+    for _ in 0..adaptive.rounds {
+        let inverse = inverse(minimiser, &settings)?;
+        let control = &minimiser.current.state.spline.control;
+        let seen: Vec<f64> = (0..windows)
+            .map(|k| {
+                let spread = inverse.combination(k, &THIRD_DIFFERENCE).trace() * variance;
+                (third_difference(control, k).norm_squared() + spread) / 3.0
+            })
+            .collect();
+        let pooled = pool.mean(&seen);
+        let mut largest_change = 0.0f64;
+        let mut next = factors.clone();
+        for (factor, v) in next.iter_mut().zip(pooled) {
+            let estimate = variance / (v * settings.lambda3);
+            let change = estimate / *factor;
+            largest_change = largest_change.max(change.ln().abs());
+            *factor = (*factor * change.powi(relaxation)).clamp(1e-3, 1e5);
+        }
+
+        let before = (minimiser.current.clone(), factors);
+        factors = next;
+        minimiser.problem.local_smoothness.clone_from(&factors);
+        minimiser.step(&settings)?;
+        steps += 1;
+        // Smoothness must not pull a tip in or a loop open.
+        if judge(&minimiser.problem, &minimiser.current).unexplained > allowed {
+            (minimiser.current, factors) = before;
+            minimiser.problem.local_smoothness.clone_from(&factors);
+            relaxation -= 1;
+            if relaxation == 0 {
+                break;
+            }
+            continue;
+        }
+        if largest_change < 0.05 {
+            break;
+        }
+    }
+    let inverse = inverse(minimiser, &settings)?;
+    Ok((steps, inverse))
+}
+
+/// The inverse of the undamped normal matrix at the current state.
+pub(crate) fn inverse(
+    minimiser: &mut Minimiser<'_>,
+    settings: &Settings,
+) -> Result<SelectedInverse, FitError> {
+    minimiser.assemble(settings)?;
+    // Rounding only: an unknown that nothing constrains must not stop the fit.
+    minimiser.normal.factorise(1e-9)?.selected_inverse()
+}
+
+/// A Gaussian window along the curve, and a little of the mean over all of it.
+struct Pool {
+    kernel: Vec<f64>,
+}
+
+impl Pool {
+    fn new(sigma: f64, windows: usize) -> Self {
+        let reach = ((4.0 * sigma).ceil() as usize).min(windows);
+        let kernel = (0..=reach).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
+        Self { kernel }
+    }
+
+    fn mean(&self, values: &[f64]) -> Vec<f64> {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        (0..values.len())
+            .map(|k| {
+                // As much as one window's worth of the mean: a stretch that happens to be straight
+                // is not infinitely stiff.
+                let (mut sum, mut weight) = (mean, 1.0);
+                for (offset, w) in self.kernel.iter().enumerate() {
+                    for j in [k.checked_sub(offset), Some(k + offset)] {
+                        if let Some(value) = j.and_then(|j| values.get(j)) {
+                            // The middle is met twice.
+                            let w = if offset == 0 { 0.5 * w } else { *w };
+                            sum += w * value;
+                            weight += w;
+                        }
+                    }
+                }
+                sum / weight
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,46 @@
+use accurate_geom::nalgebra::Matrix3;
+
+use crate::selected_inverse::SelectedInverse;
+use crate::uniform_spline::{UniformSpline, basis};
+
+/// How uncertain a fitted curve is, point by point.
+///
+/// The curve is the most probable one given the data and a prior on its bending whose strength was
+/// estimated from the same data, so the covariance `σ² B H⁻¹ Bᵀ` (with the prior in `H`) also counts
+/// what smoothing may have taken away: the bias is a draw from the prior.
+///
+/// Right topology and calibration are taken for granted.
+#[derive(Debug, Clone)]
+pub struct CurveCovariance {
+    /// Per control point: its covariance with itself and the next three.
+    blocks: Vec<[Matrix3<f64>; 4]>,
+}
+
+impl CurveCovariance {
+    pub(crate) fn new(inverse: &SelectedInverse, controls: usize, variance: f64) -> Self {
+        let block = |i: usize, j: usize| {
+            if j < controls { inverse.block(i, j) * variance } else { Matrix3::zeros() }
+        };
+        let blocks = (0..controls).map(|i| [0, 1, 2, 3].map(|k| block(i, i + k))).collect();
+        Self { blocks }
+    }
+
+    /// The covariance of the curve's point at parameter `t` of the fitted curve's domain
+    /// (values outside are cut to it), squared world unit.
+    ///
+    /// Its part along the curve's tangent is an uncertainty of the parametrisation, which moves
+    /// points on the curve, not the curve (except at its ends).
+    pub fn at(&self, t: f64) -> Matrix3<f64> {
+        let (span, offset) = UniformSpline::locate_in(self.blocks.len() - 3, t);
+        let weights = basis(offset);
+        let mut sum = Matrix3::zeros();
+        for i in 0..4 {
+            sum += self.blocks[span + i][0] * (weights[i] * weights[i]);
+            for j in i + 1..4 {
+                let block = &self.blocks[span + i][j - i];
+                sum += (block + block.transpose()) * (weights[i] * weights[j]);
+            }
+        }
+        sum
+    }
+}

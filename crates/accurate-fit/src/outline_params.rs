@@ -1,0 +1,149 @@
+use crate::FitError;
+use crate::outline_problem::Settings;
+use crate::uniform_spline::UniformSpline;
+
+/// Parameters of [`fit_outlines`]. Lengths in the world are converted to px at the curve's mean
+/// magnification, so that they mean the same in every unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutlineFitParams {
+    /// Distance of the spline's knots along the curve, px.
+    pub knot_spacing_px: f64,
+    /// Weight of the squared second differences of the control points (at 10 px spacing), 1/px².
+    pub lambda2: f64,
+    /// Weight of the squared third differences of the control points (at 10 px spacing), 1/px².
+    pub lambda3: f64,
+    /// The same in the first third of the iterations; geometric mean in the second third.
+    pub lambda3_start: f64,
+    /// Largest number of Levenberg-Marquardt steps.
+    pub iterations: usize,
+    /// Scale of the Cauchy weights at the end, px. Digitisation is off by at most 0.71 px.
+    pub cauchy_scale_px: f64,
+    /// The same at the start; it shrinks by 0.7 per step.
+    pub cauchy_scale_start_px: f64,
+    /// Boundary points farther than this from the fitted outline are no data, px.
+    pub reach_px: f64,
+    /// The same in the first two thirds of the iterations.
+    pub reach_start_px: f64,
+    /// Use every 4th boundary point in the first two steps and every 2nd in the next two.
+    pub subsample: bool,
+    /// Weight of a curve sample outside the mask, per px of curve.
+    pub outside_weight: f64,
+    /// First Levenberg-Marquardt damping, relative to the diagonal.
+    pub damping: f64,
+    /// Stop when a step lowers the cost by less than this fraction.
+    pub tolerance: f64,
+}
+
+impl OutlineFitParams {
+    /// For a start within a few px of the truth.
+    pub const DEFAULT: Self = Self {
+        knot_spacing_px: 10.0,
+        lambda2: 0.005,
+        lambda3: 0.3,
+        lambda3_start: 0.3,
+        iterations: 10,
+        cauchy_scale_px: 0.7,
+        cauchy_scale_start_px: 2.0,
+        reach_px: 3.0,
+        reach_start_px: 3.0,
+        subsample: true,
+        outside_weight: 0.3,
+        damping: 2e-3,
+        tolerance: 1e-5,
+    };
+
+    /// For a start that may run along the wrong strand for a stretch: stiff first, then softer.
+    pub const ANNEALED: Self = Self {
+        lambda3_start: 30.0,
+        iterations: 15,
+        cauchy_scale_start_px: 4.0,
+        reach_start_px: 6.0,
+        subsample: false,
+        ..Self::DEFAULT
+    };
+
+    /// The same for a start that is a converged fit: its last settings from the first step on.
+    pub(crate) fn settled(&self) -> Self {
+        Self {
+            lambda3_start: self.lambda3,
+            cauchy_scale_start_px: self.cauchy_scale_px,
+            reach_start_px: self.reach_px,
+            subsample: false,
+            ..*self
+        }
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), FitError> {
+        let positive = [
+            ("knot_spacing_px", self.knot_spacing_px),
+            ("lambda3", self.lambda3),
+            ("lambda3_start", self.lambda3_start),
+            ("cauchy_scale_px", self.cauchy_scale_px),
+            ("cauchy_scale_start_px", self.cauchy_scale_start_px),
+            ("reach_px", self.reach_px),
+            ("reach_start_px", self.reach_start_px),
+            ("damping", self.damping),
+        ];
+        for (name, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(FitError::BadParameter { name, value });
+            }
+        }
+        for (name, value) in [
+            ("lambda2", self.lambda2),
+            ("outside_weight", self.outside_weight),
+            ("tolerance", self.tolerance),
+        ] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(FitError::BadParameter { name, value });
+            }
+        }
+        Ok(())
+    }
+
+    /// Settings of one iteration for a spline with knots `spacing_px` apart.
+    pub(crate) fn settings(&self, iteration: usize, scale: &SmoothnessScale) -> Settings {
+        let stage = (3 * iteration / self.iterations.max(1)).min(2);
+        let share = stage as f64 / 2.0;
+        let lambda3 = self.lambda3_start.powf(1.0 - share) * self.lambda3.powf(share);
+        let decayed = self.cauchy_scale_start_px * 0.7f64.powi(iteration as i32);
+        let stride = match iteration {
+            0 | 1 if self.subsample => 4,
+            2 | 3 if self.subsample => 2,
+            _ => 1,
+        };
+        Settings {
+            reach_px: if stage < 2 { self.reach_start_px } else { self.reach_px },
+            scale_px: decayed.max(self.cauchy_scale_px),
+            stride,
+            lambda2: self.lambda2 * scale.second,
+            lambda3: lambda3 * scale.third,
+            outside_weight: self.outside_weight,
+        }
+    }
+}
+
+/// Turns smoothness weights per px at 10 px knot spacing into weights for the control points at
+/// hand: world unit, and the spacing they really have (`D3 c ~ spacing³ c'''`, summed over
+/// `length / spacing` terms).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SmoothnessScale {
+    pub(crate) second: f64,
+    pub(crate) third: f64,
+}
+
+impl SmoothnessScale {
+    pub(crate) fn new(spline: &UniformSpline, px_per_unit: f64) -> Self {
+        let spacing_px = spline.length(8) * px_per_unit / spline.spans() as f64;
+        let ratio = 10.0 / spacing_px;
+        let unit = px_per_unit * px_per_unit;
+        Self { second: unit * ratio.powi(3), third: unit * ratio.powi(5) }
+    }
+}
+
+/// Settings under which a fit is judged.
+pub(crate) fn final_settings(params: &OutlineFitParams, scale: &SmoothnessScale) -> Settings {
+    let last = OutlineFitParams { subsample: false, ..*params };
+    let settings = last.settings(params.iterations.max(1) + 2, scale);
+    Settings { scale_px: params.cauchy_scale_px, ..settings }
+}

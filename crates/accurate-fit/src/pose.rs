@@ -1,0 +1,104 @@
+use accurate_geom::{Curve3, Pixel, Point3, Rig, View, View1, View2};
+
+use crate::curve::{dense_points, from_curve};
+use crate::outline_problem::OutlineProblem;
+use crate::projector::Projector;
+use crate::uniform_spline::UniformSpline;
+use crate::{FitError, Outline};
+
+/// Both outlines, and where the curve is allowed to leave them.
+#[derive(Debug, Clone)]
+pub struct OutlinePair<'a> {
+    outline1: &'a Outline<View1>,
+    outline2: &'a Outline<View2>,
+    bridges: [Vec<[f64; 4]>; 2],
+}
+
+impl<'a> OutlinePair<'a> {
+    /// The outlines of view 1 and view 2.
+    pub fn new(outline1: &'a Outline<View1>, outline2: &'a Outline<View2>) -> Self {
+        Self { outline1, outline2, bridges: Default::default() }
+    }
+
+    /// Allows the curve to run outside the masks within 4 px of these straight stretches: gaps that
+    /// a tracer bridged.
+    pub fn with_bridges(
+        mut self,
+        bridges1: &[(Pixel<View1>, Pixel<View1>)],
+        bridges2: &[(Pixel<View2>, Pixel<View2>)],
+    ) -> Self {
+        self.bridges = [flat(bridges1), flat(bridges2)];
+        self
+    }
+}
+
+fn flat<V: View>(bridges: &[(Pixel<V>, Pixel<V>)]) -> Vec<[f64; 4]> {
+    bridges
+        .iter()
+        .filter(|(a, b)| a.is_finite() && b.is_finite())
+        .map(|(a, b)| [a.x, a.y, b.x, b.y])
+        .collect()
+}
+
+/// The problem of a curve and its outlines, and the curve with knots of the asked spacing.
+pub(crate) fn pose<'a>(
+    start: &Curve3,
+    outlines: &'a OutlinePair<'_>,
+    rig: &Rig,
+    knot_spacing_px: f64,
+) -> Result<(OutlineProblem<'a>, UniformSpline), FitError> {
+    let projectors = Projector::pair(rig);
+    let (spline, px_per_unit) = respaced(start, &projectors, knot_spacing_px)?;
+    let problem = OutlineProblem {
+        outlines: [&outlines.outline1.data, &outlines.outline2.data],
+        bridges: [&outlines.bridges[0], &outlines.bridges[1]],
+        projectors,
+        steps: (knot_spacing_px / 1.5).ceil().clamp(2.0, 64.0) as usize,
+        px_per_unit,
+        local_smoothness: Vec::new(),
+    };
+    Ok((problem, spline))
+}
+
+/// The curve as a uniform spline with knots `knot_spacing_px` apart, and the px per world unit.
+pub(crate) fn respaced(
+    curve: &Curve3,
+    projectors: &[Projector; 2],
+    knot_spacing_px: f64,
+) -> Result<(UniformSpline, f64), FitError> {
+    let points = dense_points(curve);
+    let px_per_unit = px_per_unit(&points, projectors)?;
+    let length: f64 = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+    let spans = spans_for(length * px_per_unit, knot_spacing_px)?;
+    if let Some(same) = from_curve(curve) {
+        let spacing_px = length * px_per_unit / same.spans() as f64;
+        if (spacing_px / knot_spacing_px - 1.0).abs() < 0.15 {
+            return Ok((same, px_per_unit));
+        }
+    }
+    Ok((UniformSpline::through(&points, spans)?, px_per_unit))
+}
+
+/// Number of spans for a curve of `length_px`.
+pub(crate) fn spans_for(length_px: f64, knot_spacing_px: f64) -> Result<usize, FitError> {
+    // No image is larger than 2^16 px; a curve may wind, but not that much.
+    if !(length_px > 1.0 && length_px < 1e6) {
+        return Err(FitError::BadLength { length_px });
+    }
+    Ok((length_px / knot_spacing_px).round().clamp(3.0, 20_000.0) as usize)
+}
+
+/// Mean magnification of both views over the points.
+pub(crate) fn px_per_unit(points: &[Point3], projectors: &[Projector; 2]) -> Result<f64, FitError> {
+    let mut sum = 0.0;
+    for point in points {
+        for (projector, view) in projectors.iter().zip(1..) {
+            let depth = projector.depth(&point.coords);
+            if !(depth > 0.0) {
+                return Err(FitError::NotInFront { view, depth });
+            }
+            sum += projector.px_per_unit(&point.coords);
+        }
+    }
+    Ok(sum / (2 * points.len().max(1)) as f64)
+}

@@ -1,0 +1,9 @@
+//! Our own method on masks: a skeleton graph per view proposes walks, epipolar angles pair them,
+//! and the fit of one 3D spline to both outlines judges the pairs.
+
+mod candidates;
+mod joint;
+mod start;
+
+pub use joint::RobustParams;
+pub(crate) use joint::{JointResult, reconstruct_masks};
