@@ -33,7 +33,7 @@ mod walk;
 
 pub use error::TraverseError;
 pub use gctt::{trace_from, trace_single};
-pub use graph::{GraphEdge, GraphNode, GraphParams, SkeletonGraph, fill_small_holes};
+pub use graph::{GraphEdge, GraphNode, GraphParams, NodeKind, SkeletonGraph, fill_small_holes};
 pub use pair::{StartPair, start_pair, trace_pair};
 pub use params::{Norm, TraverseParams};
 pub use skeleton::endpoints;

@@ -15,7 +15,7 @@ const MAX_STRETCH_PX: f64 = 16.0;
 const TANGENT_PX: usize = 8;
 
 /// Nearest pixel of the mask: where the distance to the background is not 0.
-fn inside(radii: &Array2<f64>, at: Point2) -> bool {
+pub(super) fn inside(radii: &Array2<f64>, at: Point2) -> bool {
     // Negative and huge values saturate and fall outside; so does -1 after rounding.
     let (x, y) = (at.x.round(), at.y.round());
     x >= 0.0 && y >= 0.0 && radii.get((y as usize, x as usize)).is_some_and(|&r| r > 0.0)

@@ -1,9 +1,9 @@
 //! Links: what may be hidden between a tip and another tip, or the body ahead of it.
 
-use accurate_geom::{Pixel, Point2, View};
+use accurate_geom::{Point2, View};
 use nalgebra::Vector2;
 
-use super::{GraphEdge, GraphNode, GraphParams};
+use super::{GraphEdge, GraphNode, GraphParams, NodeKind, split_edge};
 
 /// A tip and the direction in which the body would go on.
 struct Tip {
@@ -136,22 +136,7 @@ fn split<V: View>(
                 node
             }
             _ => {
-                let at: Pixel<V> = edges[hit.edge].points[hit.index];
-                nodes.push(GraphNode { at, degree: 2 });
-                let node = nodes.len() - 1;
-                let edge = &mut edges[hit.edge];
-                let (points, radii) =
-                    (edge.points.split_off(hit.index), edge.radii.split_off(hit.index));
-                edge.points.push(at);
-                edge.radii.push(radii[0]);
-                let far = edge.ends[1];
-                let near = [edge.ends[0], node];
-                *edge = GraphEdge::body(
-                    near,
-                    std::mem::take(&mut edge.points),
-                    std::mem::take(&mut edge.radii),
-                );
-                edges.push(GraphEdge::body([node, far], points, radii));
+                let node = split_edge(nodes, edges, hit.edge, hit.index, NodeKind::LinkFoot);
                 later = Some((hit.edge, hit.index, node));
                 node
             }

@@ -7,6 +7,7 @@ mod params;
 mod pixels;
 mod rough;
 mod smooth;
+mod steps;
 
 use accurate_geom::{Pixel, Point2, View};
 use ndarray::Array2;
@@ -16,19 +17,34 @@ pub use params::GraphParams;
 
 use crate::TraverseError;
 
-/// A tip, a junction, or a place where a link meets the body.
+/// What a node is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum NodeKind {
+    /// The body visibly ends here.
+    Tip,
+    /// Strands cross, touch, join or separate here; or the one node of a closed curve.
+    Junction,
+    /// The body becomes thinner here: a strand that ran along another may end or turn here.
+    WidthStep,
+    /// A link ends here.
+    LinkFoot,
+}
+
+/// A node of a [`SkeletonGraph`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GraphNode<V: View> {
     /// Position, px: the pixel of a tip, the centroid of a junction's pixels.
     pub at: Pixel<V>,
-    /// Edges that end here without the links; a loop counts twice. 1 is a tip.
+    /// Edges that end here without the links; a loop counts twice.
     pub degree: usize,
+    /// What it is.
+    pub kind: NodeKind,
 }
 
 impl<V: View> GraphNode<V> {
     /// Whether the body visibly ends here.
     pub fn is_tip(&self) -> bool {
-        self.degree == 1
+        self.kind == NodeKind::Tip
     }
 }
 
@@ -125,7 +141,8 @@ impl<V: View> SkeletonGraph<V> {
         for edge in &rough.edges {
             let ends = edge.ends.map(|node| {
                 let id = *number[node].get_or_insert_with(|| {
-                    nodes.push(GraphNode { at: rough.nodes[node].into(), degree: 0 });
+                    let at = rough.nodes[node].into();
+                    nodes.push(GraphNode { at, degree: 0, kind: NodeKind::Junction });
                     nodes.len() - 1
                 });
                 nodes[id].degree += 1;
@@ -135,6 +152,9 @@ impl<V: View> SkeletonGraph<V> {
                 smooth::smooth(&edge.points, &edge.radii, params.smooth_sigma_px)?;
             edges.push(GraphEdge::body(ends, points.into_iter().map(Pixel::from).collect(), radii));
         }
+        for node in nodes.iter_mut().filter(|node| node.degree == 1) {
+            node.kind = NodeKind::Tip;
+        }
         let tips: Vec<[bool; 2]> =
             edges.iter().map(|edge| edge.ends.map(|node| nodes[node].is_tip())).collect();
         ends::stretch(&mut edges, &tips, radii, mask_thickness_px);
@@ -143,6 +163,7 @@ impl<V: View> SkeletonGraph<V> {
                 nodes[edge.ends[side]].at = edge.from_end(side, 0).into();
             }
         }
+        steps::split(&mut nodes, &mut edges, radii, mask_thickness_px, params);
         links::add(&mut nodes, &mut edges, params);
         Ok(Self { nodes, edges, mask_thickness_px })
     }
@@ -185,4 +206,27 @@ impl<V: View> GraphEdge<V> {
         let k = k.min(last);
         self.points[if side == 0 { k } else { last - k }].point()
     }
+}
+
+/// Splits an edge at one of its inner points; the part behind it becomes the last edge. The new node.
+fn split_edge<V: View>(
+    nodes: &mut Vec<GraphNode<V>>,
+    edges: &mut Vec<GraphEdge<V>>,
+    edge: usize,
+    index: usize,
+    kind: NodeKind,
+) -> usize {
+    let whole = &mut edges[edge];
+    let at = whole.points[index];
+    let (points, radii) = (whole.points.split_off(index), whole.radii.split_off(index));
+    whole.points.push(at);
+    whole.radii.push(radii[0]);
+    let node = nodes.len();
+    nodes.push(GraphNode { at, degree: 2, kind });
+    let [near, far] = whole.ends;
+    let (front, front_radii) =
+        (std::mem::take(&mut whole.points), std::mem::take(&mut whole.radii));
+    *whole = GraphEdge::body([near, node], front, front_radii);
+    edges.push(GraphEdge::body([node, far], points, radii));
+    node
 }

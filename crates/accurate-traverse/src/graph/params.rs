@@ -15,6 +15,10 @@ pub struct GraphParams {
     pub contract_px: f64,
     /// A piece on its own that is shorter than this, px, is dropped (if longer ones are there).
     pub piece_px: f64,
+    /// A stretch of an edge this much wider than the body, px, hides a second strand.
+    pub step_px: f64,
+    /// Such a stretch is at least this long, px.
+    pub step_length_px: f64,
     /// Standard deviations of the two Gaussians that smooth an edge, px (one sample per px).
     pub smooth_sigma_px: [f64; 2],
     /// Two tips this near, px, are always linked: a gap may hide a hairpin.
@@ -32,7 +36,8 @@ pub struct GraphParams {
     pub ray_slope: f64,
     /// The last part of the tip's own edge that the ray does not see, px.
     pub ray_blind_px: f64,
-    /// A link ends at a node if that is nearer along the body than this, px; else the edge is split.
+    /// A place on an edge nearer to a node than this, px along the edge, is that node; elsewhere the edge
+    /// is split for it.
     pub snap_px: f64,
 }
 
@@ -44,6 +49,8 @@ impl GraphParams {
         loop_per_spur: 1.5,
         contract_px: 3.0,
         piece_px: 6.0,
+        step_px: 0.8,
+        step_length_px: 5.0,
         smooth_sigma_px: [1.5, 1.0],
         near_link_px: 24.0,
         far_link_px: 50.0,
@@ -73,6 +80,8 @@ impl GraphParams {
             ("loop_per_spur", self.loop_per_spur),
             ("contract_px", self.contract_px),
             ("piece_px", self.piece_px),
+            ("step_px", self.step_px),
+            ("step_length_px", self.step_length_px),
             ("near_link_px", self.near_link_px),
             ("far_link_px", self.far_link_px),
             ("ray_from_px", self.ray_from_px),

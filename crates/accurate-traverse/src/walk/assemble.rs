@@ -4,7 +4,7 @@ use accurate_geom::{Pixel, View};
 
 use super::prices::EdgePrices;
 use super::turns::Turns;
-use super::{Decision, HalfEdge, PointFlags, Walk, WalkCost, WalkEnd, WalkParams};
+use super::{Decision, HalfEdge, PointFlags, Walk, WalkCost, WalkEnd};
 use crate::SkeletonGraph;
 
 /// A walk with its price.
@@ -17,12 +17,7 @@ pub(super) struct Priced {
 }
 
 /// The price of a walk, from scratch.
-pub(super) fn price(
-    turns: &Turns,
-    prices: &[EdgePrices],
-    params: &WalkParams,
-    halves: Vec<u32>,
-) -> Priced {
+pub(super) fn price(turns: &Turns, prices: &[EdgePrices], halves: Vec<u32>) -> Priced {
     let mut cost = WalkCost::default();
     let mut uses = vec![0u8; prices.len()];
     halves.iter().for_each(|&half| uses[half as usize / 2] += 1);
@@ -39,24 +34,23 @@ pub(super) fn price(
             if left == super::turns::reverse(came) { &mut cost.u_turns } else { &mut cost.bending };
         *part += price;
     });
-    let closed = is_closed(turns, params, &halves);
+    let closed = is_closed(turns, &halves);
     if closed {
         cost.bending += turns.bend(&ahead_at_end(turns, &halves), halves[0]);
     } else {
         let ends = [turns.from[halves[0] as usize], turns.to[halves[halves.len() - 1] as usize]];
-        let inner = ends.iter().filter(|&&node| !turns.tip[node as usize]).count();
-        cost.ends = params.inner_end * inner as f64;
+        cost.ends = ends.iter().map(|&node| turns.ending[node as usize]).sum();
     }
     Priced { halves, cost, closed, uses }
 }
 
 /// Whether the walk is cheaper closed than with two ends at the node where it starts and ends.
-pub(super) fn is_closed(turns: &Turns, params: &WalkParams, halves: &[u32]) -> bool {
+pub(super) fn is_closed(turns: &Turns, halves: &[u32]) -> bool {
     let (Some(&first), Some(&last)) = (halves.first(), halves.last()) else { return false };
     let node = turns.from[first as usize];
     node == turns.to[last as usize]
         && !turns.tip[node as usize]
-        && turns.bend(&ahead_at_end(turns, halves), first) < 2.0 * params.inner_end
+        && turns.bend(&ahead_at_end(turns, halves), first) < 2.0 * turns.ending[node as usize]
 }
 
 fn ahead_at_end(turns: &Turns, halves: &[u32]) -> nalgebra::Vector2<f64> {

@@ -95,7 +95,6 @@ pub(super) fn search(turns: &Turns, prices: &[EdgePrices], params: &WalkParams) 
             continue;
         }
         let price = &prices[h / 2];
-        let tip = turns.tip[turns.from[h] as usize];
         arena.push((u32::MAX, half));
         uses.push(&unused, 0, h / 2);
         beam.push(State {
@@ -103,7 +102,7 @@ pub(super) fn search(turns: &Turns, prices: &[EdgePrices], params: &WalkParams) 
             half,
             first: half,
             ahead: turns.exit[h],
-            paid: if tip { 0.0 } else { params.inner_end },
+            paid: turns.ending[turns.from[h] as usize],
             edges: nothing + price.total[1] - price.total[0],
             edges_least: nothing_least + price.least[1] - price.least[0],
         });
@@ -111,7 +110,7 @@ pub(super) fn search(turns: &Turns, prices: &[EdgePrices], params: &WalkParams) 
     let mut steps: Vec<Step> = Vec::new();
     for _ in 1..=params.max_steps {
         for state in &beam {
-            let Some(total) = total(turns, params, state) else { continue };
+            let Some(total) = total(turns, state) else { continue };
             if finished.len() < wanted {
                 finished.push(Finished { total, entry: state.entry });
             } else if let Some(mut worst) = finished.peek_mut()
@@ -185,15 +184,14 @@ pub(super) fn search(turns: &Turns, prices: &[EdgePrices], params: &WalkParams) 
 }
 
 /// What the walk costs if it ends here, if it may.
-fn total(turns: &Turns, params: &WalkParams, state: &State) -> Option<f64> {
+fn total(turns: &Turns, state: &State) -> Option<f64> {
     if turns.link[state.half as usize] {
         return None;
     }
     let (start, end) = (turns.from[state.first as usize], turns.to[state.half as usize]);
-    let tip = |node: u32| turns.tip[node as usize];
-    let open = if tip(end) { 0.0 } else { params.inner_end };
-    let closing = if start == end && !tip(end) {
-        turns.bend(&state.ahead, state.first) - params.inner_end
+    let open = turns.ending[end as usize];
+    let closing = if start == end && !turns.tip[end as usize] {
+        turns.bend(&state.ahead, state.first) - turns.ending[start as usize]
     } else {
         f64::INFINITY
     };

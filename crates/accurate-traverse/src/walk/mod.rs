@@ -175,11 +175,11 @@ pub fn k_best_walks_with_reward<V: View>(
     let mut seen = BTreeSet::new();
     let mut priced = Vec::new();
     for halves in found {
-        let closed = assemble::is_closed(&turns, params, &halves);
+        let closed = assemble::is_closed(&turns, &halves);
         if !seen.insert(canonical(&halves, closed)) {
             continue;
         }
-        priced.push(assemble::price(&turns, &prices, params, halves));
+        priced.push(assemble::price(&turns, &prices, halves));
     }
     priced.sort_by(|a, b| {
         a.cost.total().total_cmp(&b.cost.total()).then_with(|| a.halves.cmp(&b.halves))

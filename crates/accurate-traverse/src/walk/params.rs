@@ -27,8 +27,14 @@ pub struct WalkParams {
     pub bend_by_length: f64,
     /// Turning round at a tip: the image of a hairpin may have merged into one strand.
     pub u_turn: f64,
-    /// Starting or ending at a node that is not a tip.
+    /// Turning round where the body becomes thinner.
+    pub step_u_turn: f64,
+    /// Turning round at a junction: a hairpin may end on another strand.
+    pub inner_u_turn: f64,
+    /// Starting or ending at a node that is neither a tip nor a place where the body becomes thinner.
     pub inner_end: f64,
+    /// Starting or ending where the body becomes thinner.
+    pub step_end: f64,
     /// Body not walked along, per px.
     pub uncovered_per_px: f64,
     /// Walking along an edge a second time, per px.
@@ -56,7 +62,10 @@ impl WalkParams {
         bend: 0.4,
         bend_by_length: 0.6,
         u_turn: 0.8,
+        step_u_turn: 1.0,
+        inner_u_turn: 1.6,
         inner_end: 0.8,
+        step_end: 0.6,
         uncovered_per_px: 0.05,
         reuse_per_px: 0.02,
         reuse_max_px: 60.0,
@@ -86,7 +95,10 @@ impl WalkParams {
             ("bend", self.bend),
             ("bend_by_length", self.bend_by_length),
             ("u_turn", self.u_turn),
+            ("step_u_turn", self.step_u_turn),
+            ("inner_u_turn", self.inner_u_turn),
             ("inner_end", self.inner_end),
+            ("step_end", self.step_end),
             ("uncovered_per_px", self.uncovered_per_px),
             ("reuse_per_px", self.reuse_per_px),
             ("reuse_max_px", self.reuse_max_px),

@@ -4,7 +4,7 @@ use accurate_geom::{Point2, View};
 use nalgebra::Vector2;
 
 use super::{HalfEdge, WalkParams};
-use crate::SkeletonGraph;
+use crate::{NodeKind, SkeletonGraph};
 
 /// Everything about half-edges that a walk asks for, by their index `2 edge + reversed`.
 #[derive(Debug)]
@@ -22,9 +22,11 @@ pub(super) struct Turns {
     first: Vec<u32>,
     leaving: Vec<u32>,
     pub tip: Vec<bool>,
+    /// Price of turning round at the node, and of starting or ending there.
+    pub turning: Vec<f64>,
+    pub ending: Vec<f64>,
     bend: f64,
     bend_by_length: f64,
-    u_turn: f64,
 }
 
 impl Turns {
@@ -41,9 +43,25 @@ impl Turns {
             first: vec![0; nodes.len() + 1],
             leaving: Vec::with_capacity(count),
             tip: nodes.iter().map(|node| node.is_tip()).collect(),
+            turning: nodes
+                .iter()
+                .map(|node| match node.kind {
+                    NodeKind::Tip => params.u_turn,
+                    NodeKind::WidthStep => params.step_u_turn,
+                    NodeKind::Junction => params.inner_u_turn,
+                    NodeKind::LinkFoot => f64::INFINITY,
+                })
+                .collect(),
+            ending: nodes
+                .iter()
+                .map(|node| match node.kind {
+                    NodeKind::Tip => 0.0,
+                    NodeKind::WidthStep => params.step_end,
+                    NodeKind::Junction | NodeKind::LinkFoot => params.inner_end,
+                })
+                .collect(),
             bend: params.bend,
             bend_by_length: params.bend_by_length,
-            u_turn: params.u_turn,
         };
         for edge in edges {
             let [a, b] = edge.ends.map(|node| node as u32);
@@ -91,12 +109,17 @@ impl Turns {
             return false;
         }
         half != reverse(from)
-            || (self.tip[self.to[from as usize] as usize] && !self.link[from as usize])
+            || (self.turning[self.to[from as usize] as usize].is_finite()
+                && !self.link[from as usize])
     }
 
     /// The price of going on along `half` when the remembered direction is `ahead`.
     pub fn price(&self, from: u32, ahead: &Vector2<f64>, half: u32) -> f64 {
-        if half == reverse(from) { self.u_turn } else { self.bend(ahead, half) }
+        if half == reverse(from) {
+            self.turning[self.to[from as usize] as usize]
+        } else {
+            self.bend(ahead, half)
+        }
     }
 
     /// The price of the bend alone.
