@@ -7,7 +7,7 @@ use accurate_match::{Proposal, ProposeParams, propose_pairs};
 use accurate_traverse::WalkParams;
 use ndarray::Array2;
 
-use super::candidates::ViewCandidates;
+use super::candidates::{ViewCandidates, free_ends};
 use super::start::start_from;
 use crate::Error;
 
@@ -32,6 +32,9 @@ pub struct RobustParams {
     pub good_unexplained: f64,
     /// A fit is good if its mean squared residual is below this, px²; 1/18 at the truth.
     pub good_chi_per_point: f64,
+    /// A fit is good only if its walks agree to this mean epipolar distance, px: a pair that does
+    /// not agree may still be bent into explaining both outlines.
+    pub good_distance_px: f64,
     /// Weight of the walks' own cost in the final choice.
     pub walk_weight: f64,
 }
@@ -48,6 +51,7 @@ impl RobustParams {
         finalists: 6,
         good_unexplained: 0.15,
         good_chi_per_point: 0.0575,
+        good_distance_px: 1.0,
         walk_weight: 0.3,
     };
 }
@@ -144,9 +148,10 @@ fn directed(points: &[Pixel<View2>], reversed: bool) -> Vec<Pixel<View2>> {
     if reversed { points.iter().rev().copied().collect() } else { points.to_vec() }
 }
 
-fn good(judgement: &Judgement, params: &RobustParams) -> bool {
+fn good(judgement: &Judgement, mean_distance_px: f64, params: &RobustParams) -> bool {
     judgement.unexplained + judgement.outside < params.good_unexplained
         && judgement.chi_per_point() < params.good_chi_per_point
+        && mean_distance_px < params.good_distance_px
 }
 
 /// Whether a good fit is there and the next proposal is not worth a try.
@@ -154,7 +159,7 @@ fn settled(candidates: &[Candidate], next: &Proposal, params: &RobustParams) -> 
     let tried = candidates.len();
     let best = candidates
         .iter()
-        .filter(|c| good(&c.fit.judgement, params))
+        .filter(|c| good(&c.fit.judgement, c.mean_distance_px, params))
         .map(|c| c.proposal.score)
         .min_by(f64::total_cmp);
     best.is_some_and(|best| {
@@ -173,12 +178,17 @@ fn judged(
     params: &RobustParams,
 ) -> Option<Candidate> {
     let (walk1, walk2) = (&view1.walks[proposal.i], &view2.walks[proposal.j]);
-    let points2 = directed(&walk2.points, proposal.reversed);
     let spacing = OutlineFitParams::DEFAULT.knot_spacing_px;
-    let (start, mean_distance_px) = start_from(&walk1.points, &points2, rig, spacing)?;
+    let (start, mean_distance_px) = start_from(
+        (&walk1.points, free_ends(walk1)),
+        (&walk2.points, free_ends(walk2)),
+        proposal.reversed,
+        rig,
+        spacing,
+    )?;
     let plain = fit_outlines(&start, outlines, rig, &OutlineFitParams::DEFAULT).ok();
     let fit = match plain {
-        Some(fit) if good(&fit.judgement, params) => fit,
+        Some(fit) if good(&fit.judgement, mean_distance_px, params) => fit,
         plain => {
             let annealed = fit_outlines(&start, outlines, rig, &OutlineFitParams::ANNEALED).ok();
             [plain, annealed]
@@ -188,7 +198,8 @@ fn judged(
         }
     };
     let walks_cost = walk1.cost.total() + walk2.cost.total();
-    let score = fit.judgement.score() + params.walk_weight * walks_cost;
+    let disagreement = (mean_distance_px - params.good_distance_px).max(0.0);
+    let score = fit.judgement.score() + params.walk_weight * walks_cost + disagreement;
     Some(Candidate { proposal: *proposal, fit, score, mean_distance_px })
 }
 

@@ -1,43 +1,48 @@
 use accurate_fit::start_curve;
-use accurate_geom::{Curve3, Pixel, Rig, Triangulation, Triangulator, View, View1, View2};
-use accurate_match::{CostModel, DistanceKind, TieOrder, align_rows};
+use accurate_geom::{Curve3, Pixel, Rig, View, View1, View2};
+use accurate_match::{FreeEnds, FreeMatchParams, FreeMatcher, MovePrices};
 
-/// A 3D curve from two walks: aligned at full length, triangulated, smoothed.
+/// Prices of the alignment that a fit starts from: a trimmed tip costs little, for only ends that a
+/// walk itself doubts may be trimmed.
+const PRICES: MovePrices =
+    MovePrices { diagonal_weight: 2.0, step: 0.02, end_skip: 0.06, gap_open: 3.0, gap_skip: 0.9 };
+
+/// A 3D curve from two walks, and the mean epipolar distance of their alignment, px.
 ///
-/// `None` if the pair gives no curve (nothing triangulates in front of both cameras, no length):
-/// such a pair is no candidate.
+/// Aligned at full length with the ends free that the walks doubt; stretches along epipolar lines
+/// are bridged; triangulated and smoothed. `None` if the pair gives no curve (nothing triangulates
+/// in front of both cameras, no length): such a pair is no candidate.
 pub(crate) fn start_from(
-    walk1: &[Pixel<View1>],
-    walk2: &[Pixel<View2>],
+    walk1: (&[Pixel<View1>], FreeEnds),
+    walk2: (&[Pixel<View2>], FreeEnds),
+    reversed: bool,
     rig: &Rig,
     knot_spacing_px: f64,
 ) -> Option<(Curve3, f64)> {
-    let model = CostModel::new(rig.fundamental(), walk1, walk2, DistanceKind::Sampson).ok()?;
-    let fill = |i: usize, row: &mut [f64]| model.fill_row(i, row);
-    let alignment = align_rows(walk1.len(), walk2.len(), fill, TieOrder::DiagonalFirst).ok()?;
-    let path = trimmed(&alignment.path);
-    let (arc1, arc2) = (arc_lengths(walk1), arc_lengths(walk2));
-    let triangulator = Triangulator::new(rig, Triangulation::LindstromNiter2);
-    let mut points = Vec::with_capacity(path.len());
-    let mut arc = Vec::with_capacity(path.len());
-    for &(i, j) in path {
-        let Ok(point) = triangulator.triangulate(walk1[i], walk2[j]) else { continue };
-        if rig.camera1().depth(&point) > 0.0 && rig.camera2().depth(&point) > 0.0 {
-            points.push(point);
-            arc.push((arc1[i] + arc2[j]) / 2.0);
-        }
-    }
+    let matcher = FreeMatcher::new(FreeMatchParams {
+        prices: PRICES,
+        free1: walk1.1,
+        free2: walk2.1,
+        ..FreeMatchParams::DEFAULT
+    });
+    let matched = matcher.match_directed(walk1.0, walk2.0, reversed, rig).ok()?;
+    let (arc1, arc2) = (arc_lengths(walk1.0), arc_lengths(walk2.0));
+    let along2 = |j: f64| {
+        let s = at(&arc2, j);
+        if reversed { arc2[arc2.len() - 1] - s } else { s }
+    };
+    let arc: Vec<f64> =
+        matched.positions.iter().map(|&(i, j)| (at(&arc1, i) + along2(j)) / 2.0).collect();
+    let points: Vec<_> = matched.points.iter().map(|p| p.position).collect();
     let curve = start_curve(&points, &arc, knot_spacing_px).ok()?;
-    Some((curve, alignment.mean_cost()))
+    Some((curve, matched.mean_epipolar_distance_px))
 }
 
-/// The path without the runs along one curve at its corners: there the other view has ended.
-fn trimmed(path: &[(usize, usize)]) -> &[(usize, usize)] {
-    let (first, last) = (path[0], path[path.len() - 1]);
-    let at = |corner: (usize, usize)| move |c: &&(usize, usize)| c.0 == corner.0 || c.1 == corner.1;
-    let head = path.iter().take_while(at(first)).count().saturating_sub(1);
-    let tail = path.iter().rev().take_while(at(last)).count().saturating_sub(1);
-    if head + tail + 4 > path.len() { path } else { &path[head..path.len() - tail] }
+/// Arc length at a fractional index.
+fn at(arc: &[f64], index: f64) -> f64 {
+    let below = (index.max(0.0) as usize).min(arc.len() - 1);
+    let above = (below + 1).min(arc.len() - 1);
+    arc[below] + (index - below as f64) * (arc[above] - arc[below])
 }
 
 fn arc_lengths<V: View>(points: &[Pixel<V>]) -> Vec<f64> {
