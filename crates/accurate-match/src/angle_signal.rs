@@ -128,9 +128,7 @@ impl AngleProfile {
                 high = high.max(phi);
             }
             let gradient = self.gradient[(centre.round() as usize).min(self.gradient.len() - 1)];
-            signal.low.push(low as f32);
-            signal.high.push(high as f32);
-            signal.squared_gradient.push(((gradient * gradient) as f32).max(f32::MIN_POSITIVE));
+            signal.push(low, high, gradient);
         }
         Ok(signal)
     }
@@ -153,6 +151,45 @@ pub struct AngleSignal {
 }
 
 impl AngleSignal {
+    /// A signal from its parts: per sample least and greatest angle (radians) and gradient (radians
+    /// per px), `step_px` apart.
+    ///
+    /// # Errors
+    /// [`MatchError::Geometry`] if there is no sample, a number is not finite, an interval is upside
+    /// down, or the step or a gradient is not positive.
+    pub fn from_samples(step_px: f64, samples: &[(f64, f64, f64)]) -> Result<Self, MatchError> {
+        positive("step of an angle signal (px)", step_px)?;
+        if samples.is_empty() {
+            return Err(GeomError::TooFewPoints { found: 0, needed: 1 }.into());
+        }
+        let mut signal =
+            Self { step_px, low: Vec::new(), high: Vec::new(), squared_gradient: Vec::new() };
+        for &(low, high, gradient) in samples {
+            positive("gradient of an angle signal (radians per px)", gradient)?;
+            for value in [low, high] {
+                if !value.is_finite() {
+                    let what = "angle of a sample".to_owned();
+                    return Err(GeomError::NotFinite { what, value }.into());
+                }
+            }
+            if high < low {
+                let (what, expected) = ("greatest angle of a sample", "the least angle or more");
+                return Err(GeomError::OutOfRange { what, value: high, expected }.into());
+            }
+            signal.push(low, high, gradient);
+        }
+        Ok(signal)
+    }
+
+    fn push(&mut self, low: f64, high: f64, gradient: f64) {
+        // Within these bounds differences and quotients of f32 stay finite; real gradients are
+        // about one over the focal length in px.
+        let squared = (gradient * gradient).clamp(1e-24, 1e24);
+        self.low.push(low.clamp(-1e6, 1e6) as f32);
+        self.high.push(high.clamp(-1e6, 1e6) as f32);
+        self.squared_gradient.push(squared as f32);
+    }
+
     /// Number of samples, at least 1.
     pub fn samples(&self) -> usize {
         self.low.len()

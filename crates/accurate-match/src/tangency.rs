@@ -17,8 +17,11 @@ pub struct TangencyParams {
 }
 
 impl TangencyParams {
-    /// The values above.
+    /// The values above, for sub-pixel curves.
     pub const DEFAULT: Self = Self { max_sine: 0.1, window_px: 4.0 };
+
+    /// For curves on whole pixels, whose noise is larger and whose direction is less certain.
+    pub const WHOLE_PIXELS: Self = Self { max_sine: 0.2, window_px: 8.0 };
 
     pub(crate) fn validate(&self) -> Result<(), MatchError> {
         not_negative("max_sine", self.max_sine)?;

@@ -1,3 +1,5 @@
+use std::ops::RangeInclusive;
+
 use crate::CostModel;
 
 /// Two positions on the curves that lie on one epipolar plane, or as nearly as the curves allow.
@@ -22,7 +24,7 @@ const SAME: f64 = 1e-6;
 /// position in view 2); the path follows one of them within a sample or two. For every point of
 /// either curve this finds where its epipolar line crosses the other curve next to the path. Of
 /// crossings that contradict each other's order, the longest consistent chain is kept. A cell none
-/// of whose points has a crossing stays as it is.
+/// of whose points has a crossing stays as it is. Nothing lies beyond the ends of the path.
 ///
 /// `path` is connected: every step advances one index or both by 1; cells outside the curves are
 /// ignored.
@@ -35,13 +37,14 @@ const SAME: f64 = 1e-6;
 pub fn zero_crossings(path: &[(usize, usize)], costs: &CostModel) -> Vec<MatchedPosition> {
     let path: Vec<_> =
         path.iter().copied().filter(|&(i, j)| i < costs.n1() && j < costs.n2()).collect();
+    let (Some(&begin), Some(&end)) = (path.first(), path.last()) else { return Vec::new() };
     let mut crossings = Vec::with_capacity(2 * path.len());
     let mut crossed1 = vec![false; costs.n1()];
     let mut crossed2 = vec![false; costs.n2()];
     for run in path.chunk_by(|a, b| a.0 == b.0) {
         let (i, from, to) = (run[0].0, run[0].1, run[run.len() - 1].1);
         let signed = |j| costs.signed_distance_in_view2(i, j);
-        if let Some(at2) = crossing(from, to, costs.n2(), signed) {
+        if let Some(at2) = crossing(from, to, begin.1..=end.1, signed) {
             crossed1[i] = true;
             crossings.push(MatchedPosition { at1: i as f64, at2, exact: true });
         }
@@ -49,7 +52,7 @@ pub fn zero_crossings(path: &[(usize, usize)], costs: &CostModel) -> Vec<Matched
     for run in path.chunk_by(|a, b| a.1 == b.1) {
         let (j, from, to) = (run[0].1, run[0].0, run[run.len() - 1].0);
         let signed = |i| costs.signed_distance_in_view1(i, j);
-        if let Some(at1) = crossing(from, to, costs.n1(), signed) {
+        if let Some(at1) = crossing(from, to, begin.0..=end.0, signed) {
             crossed2[j] = true;
             crossings.push(MatchedPosition { at1, at2: j as f64, exact: true });
         }
@@ -59,16 +62,16 @@ pub fn zero_crossings(path: &[(usize, usize)], costs: &CostModel) -> Vec<Matched
     merge(chain, left.map(|&(i, j)| (i as f64, j as f64)))
 }
 
-/// Where a sampled function of one index changes sign, next to the indices `from..=to`: of several
-/// places the nearest to its least absolute value among them, then the first.
+/// Where a sampled function of one index changes sign, next to the indices `from..=to` but `within`
+/// the path: of several places the nearest to its least absolute value among them, then the first.
 fn crossing(
     from: usize,
     to: usize,
-    count: usize,
+    within: RangeInclusive<usize>,
     signed: impl Fn(usize) -> Option<f64>,
 ) -> Option<f64> {
-    let first = from.saturating_sub(1);
-    let last = (to + 1).min(count - 1);
+    let first = from.saturating_sub(1).max(*within.start());
+    let last = (to + 1).min(*within.end());
     let values: Vec<Option<f64>> = (first..=last).map(signed).collect();
     let mut least = (f64::INFINITY, from as f64);
     let mut places = Vec::new();
