@@ -1,12 +1,14 @@
+use accurate_geom::nalgebra::Matrix3;
 use accurate_geom::{Curve3, Rig};
 
 use crate::boundary_fit::{finish, run};
 use crate::judgement::judge;
-use crate::minimise::Minimiser;
+use crate::minimise::{Minimiser, Priors};
 use crate::normal::THIRD_DIFFERENCE;
 use crate::outline_params::{SmoothnessScale, final_settings};
 use crate::outline_problem::{Settings, third_difference};
 use crate::pose::pose;
+use crate::projector::Nuisance;
 use crate::selected_inverse::SelectedInverse;
 use crate::{FitError, OutlineFit, OutlineFitParams, OutlinePair};
 
@@ -77,17 +79,37 @@ pub fn fit_outlines_adaptively(
 ) -> Result<OutlineFit, FitError> {
     params.validate()?;
     adaptive.validate()?;
-    let fitted = fit_with_knots(start, outlines, rig, params, adaptive)?;
+    Ok(fit_posterior(start, outlines, rig, params, adaptive, Priors::default())?.fit)
+}
+
+/// A fit with what the data say about the nuisance parameters.
+pub(crate) struct Posterior {
+    pub(crate) fit: OutlineFit,
+    pub(crate) nuisance: Nuisance,
+    /// Covariance of shift (px) and roll (rad); zero if they are no unknowns.
+    pub(crate) nuisance_covariance: Matrix3<f64>,
+}
+
+/// The adaptive fit, with knots closer where needed.
+pub(crate) fn fit_posterior(
+    start: &Curve3,
+    outlines: &OutlinePair<'_>,
+    rig: &Rig,
+    params: &OutlineFitParams,
+    adaptive: &AdaptiveParams,
+    priors: Priors,
+) -> Result<Posterior, FitError> {
+    let fitted = fit_with_knots(start, outlines, rig, params, adaptive, priors)?;
     let halved =
         OutlineFitParams { knot_spacing_px: 0.5 * params.knot_spacing_px, ..params.settled() };
-    let unexplained = |fit: &OutlineFit| fit.judgement.unexplained + fit.judgement.outside;
+    let unexplained = |p: &Posterior| p.fit.judgement.unexplained + p.fit.judgement.outside;
     if unexplained(&fitted) <= adaptive.max_unexplained
         || halved.knot_spacing_px < adaptive.min_knot_spacing_px
     {
         return Ok(fitted);
     }
     // Perhaps it bends more than knots so far apart can.
-    let finer = fit_with_knots(&fitted.curve, outlines, rig, &halved, adaptive)?;
+    let finer = fit_with_knots(&fitted.fit.curve, outlines, rig, &halved, adaptive, priors)?;
     let gain = unexplained(&fitted) - unexplained(&finer);
     Ok(if gain > adaptive.max_unexplained { finer } else { fitted })
 }
@@ -98,12 +120,21 @@ fn fit_with_knots(
     rig: &Rig,
     params: &OutlineFitParams,
     adaptive: &AdaptiveParams,
-) -> Result<OutlineFit, FitError> {
+    priors: Priors,
+) -> Result<Posterior, FitError> {
     let (problem, spline) = pose(start, outlines, rig, params.knot_spacing_px)?;
-    let (mut minimiser, steps, converged) = run(problem, spline, params)?;
+    let (mut minimiser, steps, converged) = run(problem, spline, params, priors)?;
     let (more, inverse) = smooth(&mut minimiser, params, adaptive)?;
     let variance = adaptive.noise_inflation / 18.0;
-    finish(minimiser, params, steps + more, converged, Some((inverse, variance)))
+    let nuisance = minimiser.current.state.nuisance;
+    let nuisance_covariance = if priors.nuisance_weights.is_some() {
+        let first = 3 * minimiser.current.state.spline.control.len() + 2;
+        Matrix3::from_fn(|a, b| variance * inverse.get(first + a, first + b))
+    } else {
+        Matrix3::zeros()
+    };
+    let fit = finish(minimiser, params, steps + more, converged, Some((&inverse, variance)))?;
+    Ok(Posterior { fit, nuisance, nuisance_covariance })
 }
 
 /// Alternates smoothness and curve; returns the steps taken and the inverse of the final normal

@@ -61,7 +61,7 @@ pub fn fit_outlines(
 ) -> Result<OutlineFit, FitError> {
     params.validate()?;
     let (problem, spline) = pose(start, outlines, rig, params.knot_spacing_px)?;
-    let (minimiser, steps, converged) = run(problem, spline, params)?;
+    let (minimiser, steps, converged) = run(problem, spline, params, Priors::default())?;
     finish(minimiser, params, steps, converged, None)
 }
 
@@ -103,11 +103,12 @@ pub(crate) fn run<'a>(
     problem: OutlineProblem<'a>,
     spline: UniformSpline,
     params: &OutlineFitParams,
+    priors: Priors,
 ) -> Result<(Minimiser<'a>, usize, bool), FitError> {
     let scale = SmoothnessScale::new(&spline, problem.px_per_unit);
     let half_px = [0, 1].map(|v| problem.outlines[v].half_thickness_px);
     let start = State { spline, half_px, nuisance: Nuisance::default() };
-    let mut minimiser = Minimiser::new(problem, start, params.damping, Priors::default())?;
+    let mut minimiser = Minimiser::new(problem, start, params.damping, priors)?;
     let mut steps = 0;
     let mut converged = false;
     for iteration in 0..params.iterations {
@@ -131,7 +132,7 @@ pub(crate) fn finish(
     params: &OutlineFitParams,
     steps: usize,
     converged: bool,
-    posterior: Option<(SelectedInverse, f64)>,
+    posterior: Option<(&SelectedInverse, f64)>,
 ) -> Result<OutlineFit, FitError> {
     let Minimiser { problem, current, .. } = minimiser;
     let spline = &current.state.spline;
@@ -148,6 +149,6 @@ pub(crate) fn finish(
         converged,
         smoothness,
         covariance: posterior
-            .map(|(inverse, variance)| CurveCovariance::new(&inverse, controls, variance)),
+            .map(|(inverse, variance)| CurveCovariance::new(inverse, controls, variance)),
     })
 }

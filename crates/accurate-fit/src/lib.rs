@@ -3,6 +3,7 @@
 mod adaptive;
 mod boundary_fit;
 mod bucket_grid;
+mod calibration;
 mod chords;
 mod covariance;
 mod curve;
@@ -22,6 +23,9 @@ mod uniform_spline;
 
 pub use adaptive::{AdaptiveParams, fit_outlines_adaptively};
 pub use boundary_fit::{OutlineFit, fit_outlines, judge_curve};
+pub use calibration::{
+    CalibratedFit, CalibrationEstimate, CalibrationPriors, fit_outlines_and_calibration,
+};
 pub use covariance::CurveCovariance;
 pub use error::FitError;
 pub use judgement::{Judgement, UnexplainedStretch};

@@ -1,7 +1,8 @@
-use accurate_geom::nalgebra::{Matrix2x3, Matrix3x4, Vector2, Vector3};
+use accurate_geom::nalgebra::{Matrix2, Matrix2x3, Matrix3x4, Vector2, Vector3};
 use accurate_geom::{Camera, Rig};
 
-/// A small correction of view 2: a shift of its image and a turn about its principal point.
+/// A small correction of view 2: a shift of its image, and a turn of the camera about its optical
+/// axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Nuisance {
     pub(crate) shift_px: [f64; 2],
@@ -13,8 +14,11 @@ pub(crate) struct Nuisance {
 pub(crate) struct Projector {
     matrix: Matrix3x4<f64>,
     principal: Vector2<f64>,
-    nuisance: Nuisance,
-    cos_sin: [f64; 2],
+    /// `K`'s upper left block: turns a roll of the camera into a map of the image.
+    focal: Matrix2<f64>,
+    focal_inverse: Matrix2<f64>,
+    shift: Vector2<f64>,
+    roll: Matrix2<f64>,
 }
 
 impl Projector {
@@ -22,8 +26,11 @@ impl Projector {
         Self {
             matrix: camera.projection_matrix(),
             principal: Vector2::new(camera.k()[(0, 2)], camera.k()[(1, 2)]),
-            nuisance: Nuisance::default(),
-            cos_sin: [1.0, 0.0],
+            focal: camera.k().fixed_view::<2, 2>(0, 0).into_owned(),
+            // Upper triangular with a diagonal that the camera has checked.
+            focal_inverse: camera.k_inverse().fixed_view::<2, 2>(0, 0).into_owned(),
+            shift: Vector2::zeros(),
+            roll: Matrix2::identity(),
         }
     }
 
@@ -32,9 +39,9 @@ impl Projector {
     }
 
     pub(crate) fn set_nuisance(&mut self, nuisance: Nuisance) {
-        self.nuisance = nuisance;
         let (s, c) = nuisance.roll.sin_cos();
-        self.cos_sin = [c, s];
+        self.roll = self.focal * Matrix2::new(c, -s, s, c) * self.focal_inverse;
+        self.shift = nuisance.shift_px.into();
     }
 
     /// Depth of a world point (the last row of `K` is `0 0 1`).
@@ -46,10 +53,7 @@ impl Projector {
 
     #[inline]
     fn correct(&self, p: Vector2<f64>) -> Vector2<f64> {
-        let [c, s] = self.cos_sin;
-        let d = p - self.principal;
-        let [u, v] = self.nuisance.shift_px;
-        self.principal + Vector2::new(c * d.x - s * d.y + u, s * d.x + c * d.y + v)
+        self.principal + self.roll * (p - self.principal) + self.shift
     }
 
     /// The image of a world point, px. Meaningless unless its depth is positive.
@@ -70,23 +74,21 @@ impl Projector {
         let inverse = 1.0 / self.depth(x);
         let u = (m[(0, 0)] * x.x + m[(0, 1)] * x.y + m[(0, 2)] * x.z + m[(0, 3)]) * inverse;
         let v = (m[(1, 0)] * x.x + m[(1, 1)] * x.y + m[(1, 2)] * x.z + m[(1, 3)]) * inverse;
-        let [c, s] = self.cos_sin;
         let mut jacobian = Matrix2x3::zeros();
         for k in 0..3 {
-            let du = (m[(0, k)] - u * m[(2, k)]) * inverse;
-            let dv = (m[(1, k)] - v * m[(2, k)]) * inverse;
-            jacobian[(0, k)] = c * du - s * dv;
-            jacobian[(1, k)] = s * du + c * dv;
+            jacobian[(0, k)] = (m[(0, k)] - u * m[(2, k)]) * inverse;
+            jacobian[(1, k)] = (m[(1, k)] - v * m[(2, k)]) * inverse;
         }
+        let jacobian = self.roll * jacobian;
         (self.correct(Vector2::new(u, v)), jacobian)
     }
 
-    /// Derivative of a projected point with respect to the roll, px per radian.
+    /// Derivative with respect to the roll of the (corrected) image of a point, px per radian.
     #[inline]
     pub(crate) fn roll_derivative(&self, image: &Vector2<f64>) -> Vector2<f64> {
-        let [u, v] = self.nuisance.shift_px;
-        let d = image - self.principal - Vector2::new(u, v);
-        Vector2::new(-d.y, d.x)
+        let turned = self.focal_inverse * (image - self.principal - self.shift);
+        // d/da R(a) = R(a) J with J a quarter turn, and R J = J R: no need to turn back.
+        self.focal * Vector2::new(-turned.y, turned.x)
     }
 
     /// Pixels per world unit across the line of sight at a world point.
