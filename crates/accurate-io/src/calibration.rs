@@ -23,6 +23,16 @@ fn k_candidates(case: &Path, letter: char) -> Vec<PathBuf> {
     names.iter().flat_map(|name| folders.iter().map(move |f| f.join(name))).collect()
 }
 
+/// The first place where `K` of a view lies.
+pub(crate) fn k_path(case: &Path, letter: char) -> Option<PathBuf> {
+    k_candidates(case, letter).into_iter().find(|path| path.is_file())
+}
+
+/// `calibration/D_L.txt` of a case, which may be absent.
+pub(crate) fn lens_path(case: &Path, letter: char) -> PathBuf {
+    case.join("calibration").join(format!("D_{letter}.txt"))
+}
+
 /// The rig of a case folder; `size_source` is the file that gave the image sizes.
 ///
 /// Each error names the file that holds the offending value.
@@ -34,13 +44,10 @@ pub(crate) fn read_rig_of_case(
 ) -> Result<Rig, IoError> {
     let view = |index: usize| -> Result<Camera, IoError> {
         let ((letter, part), size) = (VIEWS[index], sizes[index]);
-        let mut candidates = k_candidates(case, letter);
-        let k_path = match candidates.iter().find(|p| p.is_file()) {
-            Some(found) => found.clone(),
-            None => {
-                let path = candidates.remove(0);
-                return Err(IoError::Missing { path, also_tried: candidates });
-            }
+        let Some(k_path) = k_path(case, letter) else {
+            let mut also_tried = k_candidates(case, letter);
+            let path = also_tried.remove(0);
+            return Err(IoError::Missing { path, also_tried });
         };
         let rt_path = rt_path(case, letter);
         let k = read_matrix3(&k_path)?;
@@ -73,7 +80,7 @@ pub(crate) fn read_lens(
     with_pictures: bool,
 ) -> Result<Camera, IoError> {
     let (letter, part) = VIEWS[index];
-    let path = case.join("calibration").join(format!("D_{letter}.txt"));
+    let path = lens_path(case, letter);
     if !path.is_file() {
         return Ok(camera.clone());
     }

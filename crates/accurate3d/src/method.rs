@@ -53,6 +53,19 @@ impl Method {
         }
     }
 
+    /// The parameters of [`matcher`](Self::matcher), as text.
+    pub(crate) fn matching_described(self) -> String {
+        match self {
+            Self::Accurate | Self::Paper => format!("{:?}", EcdpParams::PAPER),
+            Self::PaperRefined => format!("{:?}", EcdpParams::PAPER_REFINED),
+            Self::Baert => format!("{:?}", Baert::default()),
+            Self::BaertTable => format!("{:?}", BaertTable::default()),
+            Self::Hoffmann => format!("{:?}", Hoffmann::default()),
+            Self::HoffmannTable => format!("{:?}", HoffmannTable::default()),
+            Self::Baur => format!("{:?}", Baur::default()),
+        }
+    }
+
     /// The matcher of ordered curves behind the method.
     pub(crate) fn matcher(self) -> Box<dyn CurveMatcher> {
         match self {

@@ -30,6 +30,23 @@ impl Params {
     }
 }
 
+impl Params {
+    /// The parameters that take effect, stage by stage, as text for a report.
+    pub fn described(&self) -> Vec<(&'static str, String)> {
+        let joint = (self.method, self.input) == (Method::Accurate, InputKind::Mask);
+        let mut stages = Vec::new();
+        if joint {
+            stages.push(("joint choice", format!("{:?}", self.robust)));
+        } else {
+            if self.input == InputKind::Mask {
+                stages.push(("traversal", format!("{:?}", self.traverse)));
+            }
+            stages.push(("matching", self.method.matching_described()));
+        }
+        stages
+    }
+}
+
 /// Reconstructs the 3D curve seen in both views of a pair.
 ///
 /// Masks are skeletonised (Zhang-Suen), ordered by GCTT, and matched. Points are matched in their

@@ -22,7 +22,7 @@ pub fn run(args: &DemoArgs, console: &Console) -> Result<(), Failure> {
     let parts = PairParts { points: true, masks: true, images: false, truth: Truth::Required };
     let pair = ViewPair::from(read_pair(&dir, parts)?);
     let reconstruction = reconstruct(&pair, &Params::new(InputKind::Mask, Method::default()))?;
-    let result = result_json(&dir, &pair, &reconstruction)?;
+    let result = result_json(&dir, parts, &pair, &reconstruction)?;
     let formats = [CurveFormat::Ply, CurveFormat::Vtp];
     write_outputs(&args.out, &pair, &reconstruction, &result, &formats, true)?;
     if console.json {

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use accurate3d::io::{PairParts, Truth, find_pairs, read_pair, write_curve, write_json};
+use accurate3d::io::{PairParts, Truth, find_pairs, hash_pair, read_pair, write_curve, write_json};
 use accurate3d::{
     InputKind, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair, picture_svg, reconstruct,
 };
@@ -101,7 +101,7 @@ fn one(dir: &Path, out: &Path, args: &ReconstructArgs) -> Result<(String, Value)
     };
     let pair = ViewPair::from(read_pair(dir, parts)?);
     let reconstruction = reconstruct(&pair, &Params::new(args.input, args.method))?;
-    let result = result_json(dir, &pair, &reconstruction)?;
+    let result = result_json(dir, parts, &pair, &reconstruction)?;
     write_outputs(out, &pair, &reconstruction, &result, &args.also, args.picture)?;
     Ok((summary(&reconstruction), result))
 }
@@ -131,6 +131,7 @@ pub fn write_outputs(
 /// What `result.json` says.
 pub fn result_json(
     dir: &Path,
+    parts: PairParts,
     pair: &ViewPair,
     reconstruction: &Reconstruction,
 ) -> Result<Value, Failure> {
@@ -138,6 +139,19 @@ pub fn result_json(
         Some(truth) => table_scores(&reconstruction.positions(), truth)?,
         None => Value::Null,
     };
+    let parameters: Value = Params::new(reconstruction.input, reconstruction.method)
+        .described()
+        .into_iter()
+        .map(|(stage, text)| (stage.to_owned(), Value::from(text)))
+        .collect::<serde_json::Map<_, _>>()
+        .into();
+    let inputs: Vec<Value> = hash_pair(dir, parts)?
+        .into_iter()
+        .map(|(file, hash)| {
+            let file = file.strip_prefix(dir).unwrap_or(&file).display().to_string();
+            json!({"file": file, "blake3": hash})
+        })
+        .collect();
     Ok(json!({
         "case": reconstruction.id,
         "pair": dir.display().to_string(),
@@ -148,6 +162,8 @@ pub fn result_json(
         "length": reconstruction.length(),
         "diagnostics": reconstruction.diagnostics,
         "scores": scores,
+        "parameters": parameters,
+        "inputs": inputs,
         "version": env!("CARGO_PKG_VERSION"),
         "note": NOT_FOR_CLINICAL_USE,
     }))
