@@ -10,8 +10,9 @@ pub struct Diagnostics {
     /// Mean distance in view 1 of matched pixels to their epipolar lines, px. Right orders stay
     /// below about 0.5; a wrong traversal or direction shows as more.
     pub mean_epipolar_distance_px: f64,
-    /// The largest such distance, px.
-    pub max_epipolar_distance_px: f64,
+    /// The largest such distance of a matched pair, px; none where the points are those of a fitted
+    /// curve, whose projections always meet.
+    pub max_epipolar_distance_px: Option<f64>,
     /// Fraction of each view's skeleton that the trace passes.
     pub trace_coverage: [f64; 2],
     /// Steps longer than 3 px in each view's trace.
@@ -22,6 +23,9 @@ pub struct Diagnostics {
     pub view2_reversed: bool,
     /// Matched pairs whose rays gave no finite point.
     pub dropped_pairs: usize,
+    /// Fraction of the points where the curve runs along an epipolar line (within 6 degrees, in
+    /// either view): there depth is weakly seen.
+    pub along_epipolar_line: f64,
     /// How well the curve explains both outlines, where it was fitted to them.
     pub outline: Option<OutlineDiagnostics>,
 }
@@ -42,16 +46,17 @@ pub struct OutlineDiagnostics {
 }
 
 impl Diagnostics {
-    pub(crate) fn of_joint(result: &JointResult) -> Self {
+    pub(crate) fn of_joint(result: &JointResult, along_epipolar_line: &[bool]) -> Self {
         let judgement = &result.fit.judgement;
         Self {
             mean_epipolar_distance_px: result.mean_distance_px,
-            max_epipolar_distance_px: 0.0,
+            max_epipolar_distance_px: None,
             trace_coverage: result.coverage,
             trace_jumps: [0; 2],
             matched_fraction: [1.0; 2],
             view2_reversed: false,
             dropped_pairs: 0,
+            along_epipolar_line: share(along_epipolar_line),
             outline: Some(OutlineDiagnostics {
                 unexplained: judgement.unexplained,
                 outside: judgement.outside,
@@ -62,7 +67,11 @@ impl Diagnostics {
         }
     }
 
-    pub(crate) fn of(matched: &CurveReconstruction, traces: &Traces) -> Self {
+    pub(crate) fn of(
+        matched: &CurveReconstruction,
+        traces: &Traces,
+        along_epipolar_line: &[bool],
+    ) -> Self {
         let fraction = |mut indices: Vec<usize>, total: usize| {
             indices.sort_unstable();
             indices.dedup();
@@ -75,7 +84,7 @@ impl Diagnostics {
                 .points
                 .iter()
                 .map(|p| p.epipolar_distance_px)
-                .fold(0.0, f64::max),
+                .max_by(f64::total_cmp),
             trace_coverage: traces.coverage,
             trace_jumps: traces.jumps,
             matched_fraction: [
@@ -84,7 +93,12 @@ impl Diagnostics {
             ],
             view2_reversed: traces.view2_reversed,
             dropped_pairs: matched.dropped,
+            along_epipolar_line: share(along_epipolar_line),
             outline: None,
         }
     }
+}
+
+fn share(flags: &[bool]) -> f64 {
+    flags.iter().filter(|f| **f).count() as f64 / flags.len().max(1) as f64
 }

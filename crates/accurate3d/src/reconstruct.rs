@@ -1,5 +1,7 @@
-use accurate_geom::{Curve3, Pixel, Rig, View, View1, View2};
-use accurate_match::CurvePoint;
+use accurate_fit::OutlineFit;
+use accurate_geom::nalgebra::Matrix3;
+use accurate_geom::{EpipolarAngle, Pixel, Rig, View, View1, View2};
+use accurate_match::{CurvePoint, MatchError, TangencyParams, tangency_sines1, tangency_sines2};
 use accurate_seg::{Mask, Skeleton, zhang_suen};
 use accurate_traverse::{TraverseParams, trace_pair};
 use ndarray::Array2;
@@ -86,13 +88,17 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
         .matcher()
         .reconstruct(&traces.points1, &traces.points2, &pair.rig)
         .map_err(|source| Error::Matching { case: case(), source })?;
-    let diagnostics = Diagnostics::of(&matched, &traces);
+    let along_epipolar_line = along_epipolar_lines(&matched.points, &pair.rig)
+        .map_err(|source| Error::Matching { case: case(), source })?;
+    let diagnostics = Diagnostics::of(&matched, &traces, &along_epipolar_line);
     Ok(Reconstruction {
         id: case(),
         method: params.method,
         input: params.input,
         unit: pair.rig.unit(),
         points: matched.points,
+        covariances: None,
+        along_epipolar_line,
         traces,
         diagnostics,
     })
@@ -105,14 +111,18 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         .as_ref()
         .ok_or_else(|| Error::MissingInput { case: pair.id.clone(), input: params.input })?;
     let result = reconstruct_masks(masks, &pair.rig, &params.robust, &pair.id)?;
-    let points = sampled(&result.fit.curve, &pair.rig);
-    let diagnostics = Diagnostics::of_joint(&result);
+    let (points, covariances) = sampled(&result.fit, &pair.rig);
+    let along_epipolar_line = along_epipolar_lines(&points, &pair.rig)
+        .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;
+    let diagnostics = Diagnostics::of_joint(&result, &along_epipolar_line);
     Ok(Reconstruction {
         id: pair.id.clone(),
         method: params.method,
         input: params.input,
         unit: pair.rig.unit(),
         points,
+        covariances,
+        along_epipolar_line,
         traces: Traces::walked(result),
         diagnostics,
     })
@@ -121,28 +131,43 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
 /// Distance of the points of a fitted curve in the image, px.
 const OUTPUT_SPACING_PX: f64 = 0.5;
 
-/// The fitted curve as points with their projections.
-fn sampled(curve: &Curve3, rig: &Rig) -> Vec<CurvePoint> {
+/// The fitted curve as points with their projections, and the covariance of each.
+fn sampled(fit: &OutlineFit, rig: &Rig) -> (Vec<CurvePoint>, Option<Vec<Matrix3<f64>>>) {
+    let curve = &fit.curve;
     let (from, to) = curve.domain();
-    let pixels: Vec<_> = (0..=16)
-        .filter_map(|k| rig.project(&curve.at(from + (to - from) * f64::from(k) / 16.0)).ok())
+    let pixels: Vec<_> = (0..=64)
+        .filter_map(|k| rig.project(&curve.at(from + (to - from) * f64::from(k) / 64.0)).ok())
         .collect();
-    // Sixteen chords miss little of the length, and the spacing needs no more than that.
+    // The spacing need not be exact, and these chords miss little of the length.
     let length_px = |distance: fn(&[(Pixel<View1>, Pixel<View2>)]) -> f64| {
         pixels.windows(2).map(distance).sum::<f64>()
     };
     let longest =
         length_px(|w| w[0].0.distance(w[1].0)).max(length_px(|w| w[0].1.distance(w[1].1)));
     let count = (longest / OUTPUT_SPACING_PX).ceil().clamp(2.0, 65_536.0) as usize;
-    curve
-        .uniform_parameters(count)
-        .into_iter()
-        .filter_map(|t| {
-            let position = curve.at(t);
-            let (pixel1, pixel2) = rig.project(&position).ok()?;
-            Some(CurvePoint { position, pixel1, pixel2, epipolar_distance_px: 0.0 })
-        })
-        .collect()
+    let (mut points, mut covariances) = (Vec::with_capacity(count), Vec::new());
+    for t in curve.uniform_parameters(count) {
+        let position = curve.at(t);
+        // A fit in front of both cameras was promised; a point that is not has no picture.
+        let Ok((pixel1, pixel2)) = rig.project(&position) else { continue };
+        points.push(CurvePoint { position, pixel1, pixel2, epipolar_distance_px: 0.0 });
+        covariances.extend(fit.covariance.as_ref().map(|covariance| covariance.at(t)));
+    }
+    (points, fit.covariance.is_some().then_some(covariances))
+}
+
+/// Sine of the angle between curve and epipolar line below which a depth is carried over.
+const ALONG_LINE_SINE: f64 = 0.1;
+
+/// Whether the curve runs along an epipolar line at each point, in either view.
+fn along_epipolar_lines(points: &[CurvePoint], rig: &Rig) -> Result<Vec<bool>, MatchError> {
+    let angles = EpipolarAngle::new(rig);
+    let curve1: Vec<_> = points.iter().map(|p| p.pixel1).collect();
+    let curve2: Vec<_> = points.iter().map(|p| p.pixel2).collect();
+    let window_px = TangencyParams::WHOLE_PIXELS.window_px;
+    let sines1 = tangency_sines1(&angles, &curve1, window_px)?;
+    let sines2 = tangency_sines2(&angles, &curve2, window_px)?;
+    Ok(sines1.iter().zip(&sines2).map(|(a, b)| a.min(*b) < ALONG_LINE_SINE).collect())
 }
 
 fn skeleton_pixels<V: View>(mask: &Array2<bool>, case: &str) -> Result<Vec<Pixel<V>>, Error> {

@@ -1,3 +1,4 @@
+use accurate_geom::nalgebra::Matrix3;
 use accurate_geom::{LengthUnit, Pixel, Point3, View1, View2};
 use accurate_io::{Column, CurveTable};
 use accurate_match::CurvePoint;
@@ -19,6 +20,12 @@ pub struct Reconstruction {
     pub unit: LengthUnit,
     /// Points in order along the body, with the pixels they came from.
     pub points: Vec<CurvePoint>,
+    /// Covariance of each point, squared [`Reconstruction::unit`], where the method gives one. Right
+    /// topology and the stated calibration are taken for granted.
+    pub covariances: Option<Vec<Matrix3<f64>>>,
+    /// For each point whether the curve runs along an epipolar line there, in either view: its
+    /// depth is carried over from its neighbours rather than seen.
+    pub along_epipolar_line: Vec<bool>,
     /// The ordered curves that were matched.
     pub traces: Traces,
     /// How far the result can be trusted.
@@ -56,19 +63,47 @@ impl Reconstruction {
             unit: self.unit.label().to_owned(),
             values: arc_length,
         };
-        CurveTable {
-            unit: self.unit,
-            points: self.positions(),
-            columns: vec![
-                arc_length,
-                column("epipolar_distance_px", "px", |p| p.epipolar_distance_px),
-                column("x1_px", "px", |p| p.pixel1.x),
-                column("y1_px", "px", |p| p.pixel1.y),
-                column("x2_px", "px", |p| p.pixel2.x),
-                column("y2_px", "px", |p| p.pixel2.y),
-            ],
-        }
+        let flags = self.along_epipolar_line.iter().map(|f| f64::from(u8::from(*f))).collect();
+        let mut columns = vec![
+            arc_length,
+            column("epipolar_distance_px", "px", |p| p.epipolar_distance_px),
+            column("x1_px", "px", |p| p.pixel1.x),
+            column("y1_px", "px", |p| p.pixel1.y),
+            column("x2_px", "px", |p| p.pixel2.x),
+            column("y2_px", "px", |p| p.pixel2.y),
+            Column { name: "along_epipolar_line".to_owned(), unit: String::new(), values: flags },
+        ];
+        columns.extend(self.uncertainty_columns());
+        CurveTable { unit: self.unit, points: self.positions(), columns }
     }
+
+    /// `sigma`, the largest standard deviation in any direction, and the covariance's six entries.
+    fn uncertainty_columns(&self) -> Vec<Column> {
+        let Some(covariances) = &self.covariances else { return Vec::new() };
+        let unit = self.unit.label();
+        let column = |name: &str, unit: String, value: &dyn Fn(&Matrix3<f64>) -> f64| Column {
+            name: name.to_owned(),
+            unit,
+            values: covariances.iter().map(value).collect(),
+        };
+        let mut columns = vec![column("sigma", unit.to_owned(), &largest_sigma)];
+        for (name, row, col) in [
+            ("cov_xx", 0, 0),
+            ("cov_xy", 0, 1),
+            ("cov_xz", 0, 2),
+            ("cov_yy", 1, 1),
+            ("cov_yz", 1, 2),
+            ("cov_zz", 2, 2),
+        ] {
+            columns.push(column(name, format!("{unit}^2"), &|c| c[(row, col)]));
+        }
+        columns
+    }
+}
+
+/// Square root of the largest eigenvalue.
+fn largest_sigma(covariance: &Matrix3<f64>) -> f64 {
+    covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
 }
 
 /// The ordered curves of both views, and what of the skeletons they left out.
