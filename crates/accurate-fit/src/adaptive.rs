@@ -4,9 +4,9 @@ use accurate_geom::{Curve3, Rig};
 use crate::boundary_fit::{finish, run};
 use crate::judgement::judge;
 use crate::minimise::{Minimiser, Priors};
-use crate::normal::THIRD_DIFFERENCE;
 use crate::outline_params::{SmoothnessScale, final_settings};
-use crate::outline_problem::{Settings, third_difference};
+use crate::outline_problem::Settings;
+use crate::pool::Pool;
 use crate::pose::pose;
 use crate::projector::Nuisance;
 use crate::selected_inverse::SelectedInverse;
@@ -162,21 +162,8 @@ pub(crate) fn smooth(
     for _ in 0..adaptive.rounds {
         let inverse = inverse(minimiser, &settings)?;
         let control = &minimiser.current.state.spline.control;
-        let seen: Vec<f64> = (0..windows)
-            .map(|k| {
-                let spread = inverse.combination(k, &THIRD_DIFFERENCE).trace() * variance;
-                (third_difference(control, k).norm_squared() + spread) / 3.0
-            })
-            .collect();
-        let pooled = pool.mean(&seen);
-        let mut largest_change = 0.0f64;
-        let mut next = factors.clone();
-        for (factor, v) in next.iter_mut().zip(pooled) {
-            let estimate = variance / (v * settings.lambda3);
-            let change = estimate / *factor;
-            largest_change = largest_change.max(change.ln().abs());
-            *factor = (*factor * change.powi(relaxation)).clamp(1e-3, 1e5);
-        }
+        let (next, largest_change) =
+            pool.update(&factors, &inverse, control, variance, settings.lambda3, relaxation);
 
         let before = (minimiser.current.clone(), factors);
         factors = next;
@@ -209,39 +196,4 @@ pub(crate) fn inverse(
     minimiser.assemble(settings)?;
     // Rounding only: an unknown that nothing constrains must not stop the fit.
     minimiser.normal.factorise(1e-9)?.selected_inverse()
-}
-
-/// A Gaussian window along the curve, and a little of the mean over all of it.
-struct Pool {
-    kernel: Vec<f64>,
-}
-
-impl Pool {
-    fn new(sigma: f64, windows: usize) -> Self {
-        let reach = ((4.0 * sigma).ceil() as usize).min(windows);
-        let kernel = (0..=reach).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
-        Self { kernel }
-    }
-
-    fn mean(&self, values: &[f64]) -> Vec<f64> {
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        (0..values.len())
-            .map(|k| {
-                // As much as one window's worth of the mean: a stretch that happens to be straight
-                // is not infinitely stiff.
-                let (mut sum, mut weight) = (mean, 1.0);
-                for (offset, w) in self.kernel.iter().enumerate() {
-                    for j in [k.checked_sub(offset), Some(k + offset)] {
-                        if let Some(value) = j.and_then(|j| values.get(j)) {
-                            // The middle is met twice.
-                            let w = if offset == 0 { 0.5 * w } else { *w };
-                            sum += w * value;
-                            weight += w;
-                        }
-                    }
-                }
-                sum / weight
-            })
-            .collect()
-    }
 }

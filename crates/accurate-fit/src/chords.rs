@@ -59,6 +59,26 @@ impl Chords {
         self.points.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
     }
 
+    /// Parameter of the nearest point of the stretch `[from, to]` of parameters.
+    pub(crate) fn nearest_between(&self, q: &Vector2<f64>, from: f64, to: f64) -> f64 {
+        let steps = self.steps as f64;
+        let last = self.points.len() - 2;
+        let first_chord = ((from * steps) as usize).min(last);
+        let last_chord = ((to * steps) as usize).min(last);
+        let (mut best, mut u) = (f64::INFINITY, from);
+        for k in first_chord..=last_chord {
+            let (a, b) = (self.points[k], self.points[k + 1]);
+            let e = b - a;
+            let d = q - a;
+            let t = (d.dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            let squared = (d - e * t).norm_squared();
+            if squared < best {
+                (best, u) = (squared, (k as f64 + t) / steps);
+            }
+        }
+        u.clamp(from, to)
+    }
+
     /// For every outline point the nearest point of the polyline, if nearer than `radius_px`.
     ///
     /// Works from the curve's side: each chord visits the outline points around it. The outline's

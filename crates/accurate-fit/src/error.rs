@@ -59,6 +59,16 @@ pub enum FitError {
         /// Number of unknowns.
         unknowns: usize,
     },
+    /// A matched pair has an index beyond its curve, or falls behind the pair before.
+    #[error("pair {index} = {pair:?} is not in order, or beyond curves of {lengths:?} points")]
+    BadPair {
+        /// Index of the pair, from 0.
+        index: usize,
+        /// Indices into curve 1 and curve 2.
+        pair: (usize, usize),
+        /// Points of curve 1 and curve 2.
+        lengths: (usize, usize),
+    },
     /// The correspondences are not good enough to be refined: a fit would lock the mistake in.
     #[error(
         "the match is not good enough to refine: mean epipolar distance {mean_distance_px:.2} px \

@@ -1,7 +1,7 @@
 //! Curves and distances for the tests.
 #![allow(dead_code, clippy::unwrap_used)]
 
-use accurate_geom::{Curve3, Point3};
+use accurate_geom::{Curve3, Pixel, Point3, Rig, View, View1, View2};
 use accurate_synth::SynthCase;
 
 /// The smooth curve through every 4th point of a dense polyline.
@@ -51,4 +51,54 @@ pub fn deviation(curve: &Curve3, truth: &[Point3]) -> (f64, f64) {
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     let max = there.iter().chain(&back).copied().fold(0.0, f64::max);
     (0.5 * (mean(&there) + mean(&back)), max)
+}
+
+/// Rounded to pixels, repeats dropped.
+pub fn integers<V: View>(curve: &[Pixel<V>]) -> Vec<Pixel<V>> {
+    let mut rounded: Vec<Pixel<V>> =
+        curve.iter().map(|p| Pixel::new(p.x.round(), p.y.round())).collect();
+    rounded.dedup();
+    rounded
+}
+
+/// Pairs of least total epipolar distance from corner to corner, the diagonal first.
+pub fn match_points(
+    one: &[Pixel<View1>],
+    two: &[Pixel<View2>],
+    rig: &Rig,
+) -> Vec<(usize, usize)> {
+    let (n, m) = (one.len(), two.len());
+    let lines: Vec<_> = two.iter().map(|p| rig.fundamental().line(*p).unwrap()).collect();
+    let mut cost = vec![0.0; n * m];
+    for i in 0..n {
+        for j in 0..m {
+            let before = match (i, j) {
+                (0, 0) => 0.0,
+                (0, _) => cost[j - 1] + 0.02,
+                (_, 0) => cost[(i - 1) * m] + 0.02,
+                _ => f64::min(
+                    cost[(i - 1) * m + j - 1],
+                    f64::min(cost[(i - 1) * m + j], cost[i * m + j - 1]) + 0.02,
+                ),
+            };
+            cost[i * m + j] = before + lines[j].distance(one[i]);
+        }
+    }
+    let (mut i, mut j) = (n - 1, m - 1);
+    let mut pairs = vec![(i, j)];
+    while (i, j) != (0, 0) {
+        let diagonal = if i > 0 && j > 0 { cost[(i - 1) * m + j - 1] } else { f64::INFINITY };
+        let up = if i > 0 { cost[(i - 1) * m + j] + 0.02 } else { f64::INFINITY };
+        let left = if j > 0 { cost[i * m + j - 1] + 0.02 } else { f64::INFINITY };
+        if diagonal <= up && diagonal <= left {
+            (i, j) = (i - 1, j - 1);
+        } else if up <= left {
+            i -= 1;
+        } else {
+            j -= 1;
+        }
+        pairs.push((i, j));
+    }
+    pairs.reverse();
+    pairs
 }
