@@ -1,11 +1,13 @@
-use accurate_match::CurveReconstruction;
+use std::ops::Range;
+
+use accurate_match::{CurveReconstruction, FreeMatch};
 use serde::Serialize;
 
 use crate::Traces;
 use crate::robust::JointResult;
 
 /// How far a reconstruction can be trusted, without knowing the truth.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnostics {
     /// Mean distance in view 1 of matched pixels to their epipolar lines, px. Right orders stay
     /// below about 0.5; a wrong traversal or direction shows as more.
@@ -28,6 +30,8 @@ pub struct Diagnostics {
     pub along_epipolar_line: f64,
     /// How well the curve explains both outlines, where it was fitted to them.
     pub outline: Option<OutlineDiagnostics>,
+    /// Why ordered points were matched but not adjusted, if so.
+    pub not_adjusted: Option<String>,
 }
 
 /// How well a fitted curve explains the outlines of both masks.
@@ -64,6 +68,31 @@ impl Diagnostics {
                 margin: result.margin.is_finite().then_some(result.margin),
                 fits: result.fits,
             }),
+            not_adjusted: None,
+        }
+    }
+
+    pub(crate) fn of_free_match(
+        matched: &FreeMatch,
+        counts: [usize; 2],
+        along_epipolar_line: &[bool],
+        not_adjusted: Option<String>,
+    ) -> Self {
+        let fraction = |range: &Range<usize>, count: usize| range.len() as f64 / count as f64;
+        Self {
+            mean_epipolar_distance_px: matched.mean_epipolar_distance_px,
+            max_epipolar_distance_px: None,
+            trace_coverage: [1.0; 2],
+            trace_jumps: [0; 2],
+            matched_fraction: [
+                fraction(&matched.matched1, counts[0]),
+                fraction(&matched.matched2, counts[1]),
+            ],
+            view2_reversed: matched.reversed,
+            dropped_pairs: matched.dropped,
+            along_epipolar_line: share(along_epipolar_line),
+            outline: None,
+            not_adjusted,
         }
     }
 
@@ -95,6 +124,7 @@ impl Diagnostics {
             dropped_pairs: matched.dropped,
             along_epipolar_line: share(along_epipolar_line),
             outline: None,
+            not_adjusted: None,
         }
     }
 }

@@ -22,11 +22,13 @@ mod diagnostics;
 mod direction;
 mod error;
 mod method;
+mod ordered_points;
 mod pair;
 mod picture;
 mod reconstruct;
 mod reconstruction;
 mod robust;
+mod sampled_curve;
 pub mod table;
 
 pub use diagnostics::Diagnostics;

@@ -1,13 +1,14 @@
-use accurate_fit::OutlineFit;
-use accurate_geom::nalgebra::Matrix3;
-use accurate_geom::{EpipolarAngle, Pixel, Rig, View, View1, View2};
-use accurate_match::{CurvePoint, MatchError, TangencyParams, tangency_sines1, tangency_sines2};
+use accurate_fit::PointFitParams;
+use accurate_geom::{Pixel, View, View1, View2};
+use accurate_match::FreeMatchParams;
 use accurate_seg::{Mask, Skeleton, zhang_suen};
 use accurate_traverse::{TraverseParams, trace_pair};
 use ndarray::Array2;
 
 use crate::direction::runs_against;
+use crate::ordered_points::adjusted_points;
 use crate::robust::reconstruct_masks;
+use crate::sampled_curve::{along_epipolar_lines, sampled};
 use crate::{
     Diagnostics, Error, InputKind, Method, Reconstruction, RobustParams, Traces, ViewPair,
 };
@@ -35,17 +36,18 @@ impl Params {
 impl Params {
     /// The parameters that take effect, stage by stage, as text for a report.
     pub fn described(&self) -> Vec<(&'static str, String)> {
-        let joint = (self.method, self.input) == (Method::Accurate, InputKind::Mask);
-        let mut stages = Vec::new();
-        if joint {
-            stages.push(("joint choice", format!("{:?}", self.robust)));
-        } else {
-            if self.input == InputKind::Mask {
-                stages.push(("traversal", format!("{:?}", self.traverse)));
-            }
-            stages.push(("matching", self.method.matching_described()));
+        match (self.method, self.input) {
+            (Method::Accurate, InputKind::Points) => vec![
+                ("matching", format!("{:?}", FreeMatchParams::DEFAULT)),
+                ("adjustment", format!("{:?}", PointFitParams::DEFAULT)),
+            ],
+            (Method::Accurate, _) => vec![("joint choice", format!("{:?}", self.robust))],
+            (method, InputKind::Points) => vec![("matching", method.matching_described())],
+            (method, _) => vec![
+                ("traversal", format!("{:?}", self.traverse)),
+                ("matching", method.matching_described()),
+            ],
         }
-        stages
     }
 }
 
@@ -57,8 +59,10 @@ impl Params {
 /// # Errors
 /// [`Error`], which names the case and the stage; never an empty curve, never a NaN.
 pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
-    if (params.method, params.input) == (Method::Accurate, InputKind::Mask) {
-        return joint_choice(pair, params);
+    match (params.method, params.input) {
+        (Method::Accurate, InputKind::Mask) => return joint_choice(pair, params),
+        (Method::Accurate, InputKind::Points) => return adjusted_points(pair, params),
+        _ => {}
     }
     let case = || pair.id.clone();
     let missing = || Error::MissingInput { case: case(), input: params.input };
@@ -111,7 +115,8 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         .as_ref()
         .ok_or_else(|| Error::MissingInput { case: pair.id.clone(), input: params.input })?;
     let result = reconstruct_masks(masks, &pair.rig, &params.robust, &pair.id)?;
-    let (points, covariances) = sampled(&result.fit, &pair.rig);
+    let (points, covariances) =
+        sampled(&result.fit.curve, result.fit.covariance.as_ref(), &pair.rig);
     let along_epipolar_line = along_epipolar_lines(&points, &pair.rig)
         .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;
     let diagnostics = Diagnostics::of_joint(&result, &along_epipolar_line);
@@ -126,48 +131,6 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         traces: Traces::walked(result),
         diagnostics,
     })
-}
-
-/// Distance of the points of a fitted curve in the image, px.
-const OUTPUT_SPACING_PX: f64 = 0.5;
-
-/// The fitted curve as points with their projections, and the covariance of each.
-fn sampled(fit: &OutlineFit, rig: &Rig) -> (Vec<CurvePoint>, Option<Vec<Matrix3<f64>>>) {
-    let curve = &fit.curve;
-    let (from, to) = curve.domain();
-    let pixels: Vec<_> = (0..=64)
-        .filter_map(|k| rig.project(&curve.at(from + (to - from) * f64::from(k) / 64.0)).ok())
-        .collect();
-    // The spacing need not be exact, and these chords miss little of the length.
-    let length_px = |distance: fn(&[(Pixel<View1>, Pixel<View2>)]) -> f64| {
-        pixels.windows(2).map(distance).sum::<f64>()
-    };
-    let longest =
-        length_px(|w| w[0].0.distance(w[1].0)).max(length_px(|w| w[0].1.distance(w[1].1)));
-    let count = (longest / OUTPUT_SPACING_PX).ceil().clamp(2.0, 65_536.0) as usize;
-    let (mut points, mut covariances) = (Vec::with_capacity(count), Vec::new());
-    for t in curve.uniform_parameters(count) {
-        let position = curve.at(t);
-        // A fit in front of both cameras was promised; a point that is not has no picture.
-        let Ok((pixel1, pixel2)) = rig.project(&position) else { continue };
-        points.push(CurvePoint { position, pixel1, pixel2, epipolar_distance_px: 0.0 });
-        covariances.extend(fit.covariance.as_ref().map(|covariance| covariance.at(t)));
-    }
-    (points, fit.covariance.is_some().then_some(covariances))
-}
-
-/// Sine of the angle between curve and epipolar line below which a depth is carried over.
-const ALONG_LINE_SINE: f64 = 0.1;
-
-/// Whether the curve runs along an epipolar line at each point, in either view.
-fn along_epipolar_lines(points: &[CurvePoint], rig: &Rig) -> Result<Vec<bool>, MatchError> {
-    let angles = EpipolarAngle::new(rig);
-    let curve1: Vec<_> = points.iter().map(|p| p.pixel1).collect();
-    let curve2: Vec<_> = points.iter().map(|p| p.pixel2).collect();
-    let window_px = TangencyParams::WHOLE_PIXELS.window_px;
-    let sines1 = tangency_sines1(&angles, &curve1, window_px)?;
-    let sines2 = tangency_sines2(&angles, &curve2, window_px)?;
-    Ok(sines1.iter().zip(&sines2).map(|(a, b)| a.min(*b) < ALONG_LINE_SINE).collect())
 }
 
 fn skeleton_pixels<V: View>(mask: &Array2<bool>, case: &str) -> Result<Vec<Pixel<V>>, Error> {

@@ -57,6 +57,7 @@ pub fn paper_rows() -> Vec<Row> {
         row("Baur et al., in its style", Points, true, None, Run(Method::Baur)),
         row("ACCURATE (paper)", Points, true, Some("ours-points"), Run(Method::Paper)),
         row("ACCURATE (paper, with R)", Points, true, None, Run(Method::PaperRefined)),
+        row("accurate (ours)", Points, true, None, Run(Method::Accurate)),
         row("ACCURATE (paper)", Image, true, Some("ours-image"), NO_NETWORK),
     ]
 }
