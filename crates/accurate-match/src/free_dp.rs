@@ -95,7 +95,7 @@ pub struct FreeAlignment {
 /// and Chiba 1978.
 ///
 /// # Cost
-/// O(n1·n2) time, 1 byte per cell and 48 bytes per column of memory.
+/// O(n1·n2) time, 1 byte per cell and 56 bytes per column of memory.
 pub fn align_free(
     n1: usize,
     n2: usize,

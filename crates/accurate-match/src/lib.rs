@@ -1,16 +1,25 @@
 //! Two ordered curves to correspondences to 3D points, by monotone dynamic programming over
-//! epipolar distances (ECDP).
+//! epipolar distances.
 //!
-//! [`Ecdp`] is the whole method. Its stages can be used alone: [`CostModel`] gives epipolar
-//! distances in O(1) per pair of points, [`align`] and [`align_rows`] find the cheapest monotone
-//! path through any costs, [`refine`] makes one-to-many matches unique, [`triangulate_pairs`] turns
-//! pairs of pixels into a 3D curve. Every method that does this job is a [`CurveMatcher`].
+//! Three levels:
+//!
+//! - [`Ecdp`] is the published method, corner to corner. Its stages can be used alone:
+//!   [`CostModel`] gives epipolar distances in O(1) per pair of points, [`align`] and [`align_rows`]
+//!   find the cheapest monotone path through any costs, [`refine`] makes one-to-many matches unique,
+//!   [`triangulate_pairs`] turns pairs of pixels into a 3D curve.
+//! - [`FreeMatcher`] matches curves of which either view may see more: open ends and gaps
+//!   ([`align_free`]), closed curves ([`align_cyclic`]), positions between the points
+//!   ([`zero_crossings`]), stretches along epipolar lines bridged and flagged ([`PointFlag`]).
+//! - [`propose_pairs`] ranks many candidate curves of both views by their epipolar angles, a few
+//!   microseconds per pair ([`interval_energy`]).
+//!
+//! Every method that turns two curves into one is a [`CurveMatcher`].
 //!
 //! Conventions are those of [`accurate_geom`]: pixels with x to the right and y down, `f64`
 //! throughout, undistorted coordinates.
 //!
 //! # Source
-//! ACCURATE, section 2.3.
+//! ACCURATE, section 2.3; what goes beyond it says so.
 
 mod angle_signal;
 mod cost;

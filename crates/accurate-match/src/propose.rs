@@ -92,7 +92,7 @@ impl Default for ProposeParams {
 /// that are negative, NaN or, where sizes, infinite.
 ///
 /// # Cost
-/// O(n1·n2) pairs, a few ns per cell of each alignment; about 6 ms for 64 x 64 candidates of 430 px.
+/// O(n1·n2) pairs, a few ns per cell of each alignment; about 5 ms for 64 x 64 candidates of 430 px.
 pub fn propose_pairs(
     angles: &EpipolarAngle,
     curves1: &[SignalCurve<'_, View1>],

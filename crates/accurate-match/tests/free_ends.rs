@@ -305,6 +305,26 @@ fn unusable_input_is_refused_by_name() {
 }
 
 #[test]
+fn coordinates_of_any_size_give_finite_numbers_or_an_error() {
+    let rig = scenes::rig(1.2, 20.0, 1500.0, 1500.0);
+    for size in [0.0, 1e-300, 1e6, 1e100, 1e160, 1e300, f64::MAX] {
+        let c1: Vec<_> = (0..9)
+            .map(|k| Pixel::new(size * f64::from(k % 3) / 2.0, -size * f64::from(k) / 9.0))
+            .collect();
+        let c2: Vec<_> = c1.iter().map(|p: &Pixel<View1>| Pixel::new(-p.y, p.x)).collect();
+        let matcher = FreeMatcher::default();
+        for found in
+            [matcher.match_best_direction(&c1, &c2, &rig), matcher.match_closed(&c1, &c2, &rig)]
+        {
+            let Ok(found) = found else { continue };
+            assert!(found.points.iter().all(|p| p.position.coords.iter().all(|v| v.is_finite())));
+            assert!(found.positions.iter().all(|(a, b)| a.is_finite() && b.is_finite()));
+            assert_eq!(found.points.len(), found.flags.len());
+        }
+    }
+}
+
+#[test]
 fn crossings_of_no_path_are_none() {
     let rig = scenes::rig(1.2, 20.0, 1500.0, 1500.0);
     let (c1, c2) = ([Pixel::new(500.0, 500.0)], [Pixel::new(500.0, 500.0)]);
