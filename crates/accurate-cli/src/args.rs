@@ -30,9 +30,15 @@ pub struct Cli {
     #[arg(long, global = true)]
     pub json: bool,
 
-    /// Worker threads; 0 takes all cores. The results are the same for any number.
-    #[arg(long, global = true, default_value_t = 0, value_name = "N")]
-    pub threads: usize,
+    /// Worker threads, at most 1024; 0 takes all cores. The results are the same for any number.
+    #[arg(
+        long,
+        global = true,
+        default_value_t = 0,
+        value_name = "N",
+        value_parser = clap::value_parser!(u16).range(0..=1024)
+    )]
+    pub threads: u16,
 }
 
 const EXAMPLES: &str = "\

@@ -404,6 +404,7 @@ fn wrong_usage_has_its_own_exit_code() {
         &["reconstruct", "x", "--input", "smell", "--out", "y"][..],
         &["table", "--set", "no-such-set"],
         &["table", "--cases", "0"],
+        &["demo", "--threads", "100000"],
         &["synth", "spaghetti", "--out", "y"],
     ] {
         assert_eq!(failure(accurate().args(args)).0, 2, "{args:?}");

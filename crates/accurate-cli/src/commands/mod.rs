@@ -12,7 +12,7 @@ use crate::failure::Failure;
 /// Runs the command of a parsed command line.
 pub fn run(cli: &Cli) -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new()
-        .num_threads(cli.threads)
+        .num_threads(cli.threads.into())
         .build_global()
         .map_err(|error| Failure::new(Failure::INTERNAL, error.to_string()))?;
     let console = Console::of(cli);
