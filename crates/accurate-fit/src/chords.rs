@@ -10,6 +10,8 @@ use crate::uniform_spline::{UniformSpline, basis};
 pub(crate) struct Chords {
     steps: usize,
     pub(crate) points: Vec<Vector2<f64>>,
+    /// Length of the polyline up to each point, px; only if measured.
+    arc: Vec<f64>,
 }
 
 /// The nearest point of a projected curve: squared distance (infinite: none within reach) and the
@@ -59,8 +61,37 @@ impl Chords {
         self.points.windows(2).map(|w| (w[1] - w[0]).norm()).sum()
     }
 
-    /// Parameter of the nearest point of the stretch `[from, to]` of parameters.
-    pub(crate) fn nearest_between(&self, q: &Vector2<f64>, from: f64, to: f64) -> f64 {
+    /// Measures arc lengths, for [`Chords::follow`].
+    pub(crate) fn measure(&mut self) {
+        self.arc.clear();
+        let mut total = 0.0;
+        self.arc.push(total);
+        for pair in self.points.windows(2) {
+            total += (pair[1] - pair[0]).norm();
+            self.arc.push(total);
+        }
+    }
+
+    /// Length of the polyline up to the parameter `u`, px.
+    pub(crate) fn arc_at(&self, u: f64) -> f64 {
+        let place = u * self.steps as f64;
+        let k = (place as usize).min(self.points.len() - 2);
+        self.arc[k] + (self.arc[k + 1] - self.arc[k]) * (place - k as f64)
+    }
+
+    /// Parameter of the point of the stretch `[from, to]` of parameters that is nearest to `q`, where
+    /// being off the expected arc length `expected_px` counts as `along` times being off sideways.
+    ///
+    /// The expectation decides where the nearest point does not: at a cusp of the projected curve,
+    /// and where it crosses or touches itself within the stretch.
+    pub(crate) fn follow(
+        &self,
+        q: &Vector2<f64>,
+        from: f64,
+        to: f64,
+        expected_px: f64,
+        along: f64,
+    ) -> f64 {
         let steps = self.steps as f64;
         let last = self.points.len() - 2;
         let first_chord = ((from * steps) as usize).min(last);
@@ -71,7 +102,8 @@ impl Chords {
             let e = b - a;
             let d = q - a;
             let t = (d.dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            let squared = (d - e * t).norm_squared();
+            let early = self.arc[k] + (self.arc[k + 1] - self.arc[k]) * t - expected_px;
+            let squared = (d - e * t).norm_squared() + (along * early).powi(2);
             if squared < best {
                 (best, u) = (squared, (k as f64 + t) / steps);
             }

@@ -1,4 +1,5 @@
-use accurate_geom::nalgebra::Matrix3;
+use accurate_geom::Curve3;
+use accurate_geom::nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 
 use crate::selected_inverse::SelectedInverse;
 use crate::uniform_spline::{UniformSpline, basis};
@@ -42,5 +43,20 @@ impl CurveCovariance {
             }
         }
         sum
+    }
+
+    /// Two unit vectors across `curve` (the fit this covariance belongs to) at `t`, and the
+    /// covariance of the curve's position in their plane: an ellipse of `chi² = 5.99` in it is passed
+    /// by the true curve with probability 95 %.
+    pub fn across(&self, curve: &Curve3, t: f64) -> ([Vector3<f64>; 2], Matrix2<f64>) {
+        let tangent = curve.derivative(t);
+        // Any direction across will do for a curve that stands still.
+        let tangent = tangent.try_normalize(0.0).unwrap_or_else(Vector3::x);
+        // The axis least along the tangent.
+        let helper = Vector3::ith(tangent.iamin(), 1.0);
+        let first = tangent.cross(&helper).normalize();
+        let second = tangent.cross(&first);
+        let plane = Matrix3x2::from_columns(&[first, second]);
+        ([first, second], plane.transpose() * self.at(t) * plane)
     }
 }

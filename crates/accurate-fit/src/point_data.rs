@@ -36,7 +36,11 @@ pub(crate) fn matched(
     let arc1 = arc_lengths(curve1, "point of curve 1")?;
     let arc2 = arc_lengths(curve2, "point of curve 2")?;
     if pairs.len() < 4 {
-        return Err(FitError::TooFewPoints { what: "matched pairs", found: pairs.len(), needed: 4 });
+        return Err(FitError::TooFewPoints {
+            what: "matched pairs",
+            found: pairs.len(),
+            needed: 4,
+        });
     }
     let (n1, n2) = (curve1.len(), curve2.len());
     let mut previous = (0, 0);

@@ -19,6 +19,9 @@ pub(crate) struct PointProblem<'a> {
     pub(crate) local_smoothness: Vec<f64>,
 }
 
+/// Weight of a point's progress along the curve in its association, beside its distance.
+const ALONG: f64 = 0.2;
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PointSettings {
     pub(crate) lambda3: f64,
@@ -73,6 +76,7 @@ impl PointProblem<'_> {
         for view in 0..2 {
             let projector = &self.projectors[view];
             e.chords.rebuild(&e.state.spline, projector, view as u8 + 1, self.steps)?;
+            e.chords.measure();
             let data = &self.data[view];
             let last = data.points.len() - 1;
             let mut reached = 0.0;
@@ -91,7 +95,12 @@ impl PointProblem<'_> {
                 }
                 let from = (e.state.parameters[view][i] - settings.window).max(reached);
                 let to = (e.state.parameters[view][i] + settings.window).max(from).min(end);
-                let u = e.chords.nearest_between(&q, from, to);
+                // One step of the data is one step of the curve.
+                let expected = e.chords.arc_at(reached)
+                    + data.points[..i]
+                        .last()
+                        .map_or(0.0, |p| (q - Vector2::new(p[0], p[1])).norm());
+                let u = e.chords.follow(&q, from, to, expected, ALONG);
                 let (row, u) = self.normal_row(&e.state.spline, projector, u, &q, reached);
                 let beyond = (data.free[0] && u <= 0.0) || (data.free[1] && u >= end);
                 e.rows.push(PointRow { used: !beyond, ..row });

@@ -1,6 +1,8 @@
 //! Curves and distances for the tests.
 #![allow(dead_code, clippy::unwrap_used)]
 
+use accurate_fit::CurveCovariance;
+use accurate_geom::nalgebra::Vector2;
 use accurate_geom::{Curve3, Pixel, Point3, Rig, View, View1, View2};
 use accurate_synth::SynthCase;
 
@@ -62,11 +64,7 @@ pub fn integers<V: View>(curve: &[Pixel<V>]) -> Vec<Pixel<V>> {
 }
 
 /// Pairs of least total epipolar distance from corner to corner, the diagonal first.
-pub fn match_points(
-    one: &[Pixel<View1>],
-    two: &[Pixel<View2>],
-    rig: &Rig,
-) -> Vec<(usize, usize)> {
+pub fn match_points(one: &[Pixel<View1>], two: &[Pixel<View2>], rig: &Rig) -> Vec<(usize, usize)> {
     let (n, m) = (one.len(), two.len());
     let lines: Vec<_> = two.iter().map(|p| rig.fundamental().line(*p).unwrap()).collect();
     let mut cost = vec![0.0; n * m];
@@ -101,4 +99,31 @@ pub fn match_points(
     }
     pairs.reverse();
     pairs
+}
+
+/// Squared Mahalanobis distances (2 degrees of freedom) of the truth from a fitted curve, across the
+/// curve, at `count` places inside.
+pub fn distances_across(
+    curve: &Curve3,
+    covariance: &CurveCovariance,
+    truth: &[Point3],
+    count: usize,
+) -> Vec<f64> {
+    let (start, end) = curve.domain();
+    (1..=count)
+        .map(|k| {
+            let t = start + (end - start) * k as f64 / (count + 1) as f64;
+            let p = curve.at(t);
+            let (axes, spread) = covariance.across(curve, t);
+            let nearest = truth.windows(2).map(|w| {
+                let e = w[1] - w[0];
+                let s =
+                    ((p - w[0]).dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                w[0] + e * s - p
+            });
+            let off = nearest.min_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap();
+            let e = Vector2::new(axes[0].dot(&off), axes[1].dot(&off));
+            e.dot(&(spread.try_inverse().unwrap() * e))
+        })
+        .collect()
 }
