@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use accurate_geom::nalgebra::{Matrix3, Vector3};
 use accurate_geom::{Camera, EpipolarAngle, ImageSize, LengthUnit, Pixel, Point3, Rig, View};
-use accurate_match::{FreeEnds, ProposeParams, SignalCurve, propose_pairs};
+use accurate_match::{FreeEnds, FreeMatcher, ProposeParams, SignalCurve, propose_pairs};
 
 /// A camera 1200 units from the origin, turned by `degrees` about the vertical axis.
 fn camera(degrees: f64) -> Camera {
@@ -58,4 +58,11 @@ fn main() {
     }
     let right = proposals.iter().filter(|p| p.i == p.j && p.reversed == (p.j % 2 == 1)).count();
     println!("{right} of 64 true pairs among them");
+
+    let best = proposals[0];
+    let start = Instant::now();
+    let found = FreeMatcher::default()
+        .match_directed(&points1[best.i], &points2[best.j], best.reversed, &rig)
+        .unwrap();
+    println!("the best matched in full: {} points in {:.2?}", found.points.len(), start.elapsed());
 }
