@@ -10,7 +10,10 @@ use crate::uniform_spline::{UniformSpline, basis};
 /// estimated from the same data, so the covariance `σ² B H⁻¹ Bᵀ` (with the prior in `H`) also counts
 /// what smoothing may have taken away: the bias is a draw from the prior.
 ///
-/// Right topology and calibration are taken for granted.
+/// Right topology and calibration are taken for granted. Calibrated over many kinds of curve: where
+/// the true curve is smooth the ellipses are too large (they hold it 98 % of the time instead of 95),
+/// where its curvature jumps, or exact points leave the spline's own error alone, too small (down to
+/// 75 to 85 %). `cargo run -p accurate-fit --example coverage` measures it.
 #[derive(Debug, Clone)]
 pub struct CurveCovariance {
     /// Per control point: its covariance with itself and the next three.

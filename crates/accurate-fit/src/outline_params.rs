@@ -2,7 +2,7 @@ use crate::FitError;
 use crate::outline_problem::Settings;
 use crate::uniform_spline::UniformSpline;
 
-/// Parameters of [`fit_outlines`]. Lengths in the world are converted to px at the curve's mean
+/// Parameters of [`fit_outlines`](crate::fit_outlines). Lengths in the world are converted to px at the curve's mean
 /// magnification, so that they mean the same in every unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutlineFitParams {

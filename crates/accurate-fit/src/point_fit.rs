@@ -100,8 +100,9 @@ pub struct PointFit {
 const LAMBDA3_START: f64 = 0.3;
 /// How far along the curve a point may be off its first place, and how far later, px.
 const WINDOWS_PX: [f64; 2] = [24.0, 8.0];
-/// Variance of a residual in units of the noise, for the covariance: measured so that 95 % ellipses
-/// hold the truth 95 % of the time over all families. Less than what smooths best.
+/// Variance of a residual in units of the noise, for the covariance: set so that 95 % ellipses hold
+/// the truth about 95 % of the time on average over the generated families. Less than what smooths
+/// best.
 const COVARIANCE_INFLATION: f64 = 2.0;
 /// No centreline is known better than this, px.
 const LEAST_NOISE_PX: f64 = 1e-3;
