@@ -38,7 +38,7 @@ pub use pair::ViewPair;
 pub use picture::picture_svg;
 pub use reconstruct::{Params, reconstruct};
 pub use reconstruction::{Reconstruction, Traces};
-pub use robust::RobustParams;
+pub use robust::{RobustParams, Suspicion};
 
 /// The statement that stands in every report: this is research software.
 pub const NOT_FOR_CLINICAL_USE: &str = "Research software: not for clinical use.";

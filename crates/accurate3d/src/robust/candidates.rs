@@ -1,13 +1,17 @@
 use accurate_fit::Outline;
 use accurate_geom::{Pixel, View};
 use accurate_match::{FreeEnds, SignalCurve};
-use accurate_seg::{Mask, distance_to_background, median_width_px, zhang_suen};
+use accurate_seg::{Mask, distance_to_background, zhang_suen};
 use accurate_traverse::{
-    GraphParams, SkeletonGraph, Walk, WalkEnd, WalkParams, fill_small_holes, k_best_walks,
+    GraphParams, SkeletonGraph, Walk, WalkEnd, WalkParams, fill_small_holes,
+    k_best_walks_with_reward,
 };
 use ndarray::Array2;
 
 use crate::Error;
+
+/// Background kept around the body when the image is cut down to it, px.
+const MARGIN_PX: usize = 3;
 
 /// Everything that one view says: its outline, and the walks that could be the body.
 pub(crate) struct ViewCandidates<V: View> {
@@ -15,6 +19,10 @@ pub(crate) struct ViewCandidates<V: View> {
     pub(crate) walks: Vec<Walk<V>>,
     /// Bridges over what was not seen, as straight stretches.
     pub(crate) bridges: Vec<(Pixel<V>, Pixel<V>)>,
+    /// In the frame of the cut image.
+    graph: SkeletonGraph<V>,
+    /// Where the cut image begins, px.
+    origin: [f64; 2],
 }
 
 impl<V: View> ViewCandidates<V> {
@@ -26,31 +34,65 @@ impl<V: View> ViewCandidates<V> {
             |source| Error::Segmentation { case: case.to_owned(), view: V::NUMBER, source };
         let traversal = |source| Error::Traversal { case: case.to_owned(), source };
         let fitting = |source| Error::Fitting { case: case.to_owned(), source };
-        let mask = Mask::from_array(array.clone()).map_err(segmentation)?;
-        mask.require_foreground().map_err(segmentation)?;
-        let thickness = median_width_px(&mask).map_err(segmentation)?;
+        let whole = Mask::from_array(array.clone()).map_err(segmentation)?;
+        whole.require_foreground().map_err(segmentation)?;
+        let outline = Outline::from_mask(array.view()).map_err(fitting)?;
+
+        let (cut, origin) = cut_to_body(array);
+        let mask = Mask::from_array(cut.clone()).map_err(segmentation)?;
+        let mut thin = zhang_suen(&mask);
+        let mut radii = distance_to_background(&mask).map_err(segmentation)?;
+        let thickness = median_width(&thin, &radii);
         // The holes of near-tangent overlaps would make dozens of nodes; only the graph loses them,
         // the fit sees the mask as it is.
-        let filled = fill_small_holes(array, GraphParams::hole_area_px(thickness));
-        let filled = Mask::from_array(filled).map_err(segmentation)?;
-        let thin = zhang_suen(&filled);
-        let radii = distance_to_background(&filled).map_err(segmentation)?;
+        let filled = fill_small_holes(&cut, GraphParams::hole_area_px(thickness));
+        if filled != cut {
+            let filled = Mask::from_array(filled).map_err(segmentation)?;
+            thin = zhang_suen(&filled);
+            radii = distance_to_background(&filled).map_err(segmentation)?;
+        }
         let graph = SkeletonGraph::new(thin.as_array(), &radii, thickness, &GraphParams::DEFAULT)
             .map_err(traversal)?;
-        let walks = k_best_walks(&graph, params).map_err(traversal)?;
-        let outline = Outline::from_mask(array.view()).map_err(fitting)?;
+        let shifted = |p: &Pixel<V>| Pixel::new(p.x + origin[0], p.y + origin[1]);
         let bridges = graph
             .edges()
             .iter()
             .filter(|edge| edge.link)
-            .flat_map(|edge| edge.points.windows(2).map(|w| (w[0], w[1])))
+            .flat_map(|edge| edge.points.windows(2).map(|w| (shifted(&w[0]), shifted(&w[1]))))
             .collect();
-        Ok(Self { outline, walks, bridges })
+        let mut view = Self { outline, walks: Vec::new(), bridges, graph, origin };
+        view.walk(params, &[], case)?;
+        Ok(view)
     }
 
-    /// The walks as candidates for pairing.
-    pub(crate) fn signals(&self) -> Vec<SignalCurve<'_, V>> {
-        self.walks
+    /// Adds the walks that want to pass twice near the `rewards` (positions and weights); those
+    /// that are there already stay where they are.
+    pub(crate) fn walk(
+        &mut self,
+        params: &WalkParams,
+        rewards: &[([f64; 2], f64)],
+        case: &str,
+    ) -> Result<(), Error> {
+        let [x0, y0] = self.origin;
+        let rewards: Vec<_> =
+            rewards.iter().map(|&([x, y], w)| (Pixel::new(x - x0, y - y0), w)).collect();
+        let mut walks = k_best_walks_with_reward(&self.graph, params, &rewards)
+            .map_err(|source| Error::Traversal { case: case.to_owned(), source })?;
+        walks.retain(|walk| self.walks.iter().all(|known| known.halves != walk.halves));
+        for walk in &mut walks {
+            // What a walk is worth without the reward.
+            walk.cost.missed_reward = 0.0;
+            for point in &mut walk.points {
+                *point = Pixel::new(point.x + x0, point.y + y0);
+            }
+        }
+        self.walks.append(&mut walks);
+        Ok(())
+    }
+
+    /// The walks from number `from` on as candidates for pairing.
+    pub(crate) fn signals(&self, from: usize) -> Vec<SignalCurve<'_, V>> {
+        self.walks[from..]
             .iter()
             .map(|walk| SignalCurve {
                 points: &walk.points,
@@ -59,6 +101,31 @@ impl<V: View> ViewCandidates<V> {
             })
             .collect()
     }
+}
+
+/// The part of the image that shows the body, and its first column and row.
+fn cut_to_body(array: &Array2<bool>) -> (Array2<bool>, [f64; 2]) {
+    let (rows, columns) = array.dim();
+    let (mut top, mut bottom, mut left, mut right) = (rows, 0, columns, 0);
+    for ((y, x), _) in array.indexed_iter().filter(|(_, set)| **set) {
+        (top, bottom) = (top.min(y), bottom.max(y));
+        (left, right) = (left.min(x), right.max(x));
+    }
+    let (top, left) = (top.saturating_sub(MARGIN_PX), left.saturating_sub(MARGIN_PX));
+    let (bottom, right) =
+        ((bottom + 1 + MARGIN_PX).min(rows), (right + 1 + MARGIN_PX).min(columns));
+    let cut =
+        Array2::from_shape_fn((bottom - top, right - left), |(y, x)| array[[top + y, left + x]]);
+    (cut, [left as f64, top as f64])
+}
+
+/// As [`accurate_seg::median_width_px`], from what is at hand.
+fn median_width(thin: &Mask, radii: &Array2<f64>) -> f64 {
+    let mut on_skeleton: Vec<f64> = thin.foreground().map(|at| radii[at]).collect();
+    on_skeleton.sort_unstable_by(f64::total_cmp);
+    let n = on_skeleton.len();
+    // Thinning never erases a component.
+    if n == 0 { 1.0 } else { on_skeleton[n / 2] + on_skeleton[(n - 1) / 2] - 1.0 }
 }
 
 /// How much of a walk's ends may be wrong: a tip on an edge that is used twice lies anywhere on it,

@@ -1,14 +1,13 @@
-use accurate_fit::{
-    AdaptiveParams, Judgement, OutlineFit, OutlineFitParams, OutlinePair, fit_outlines,
-    fit_outlines_adaptively,
-};
-use accurate_geom::{EpipolarAngle, Pixel, Rig, View1, View2};
-use accurate_match::{Proposal, ProposeParams, propose_pairs};
+use accurate_fit::{AdaptiveParams, OutlineFit, OutlinePair, fit_outlines_adaptively};
+use accurate_geom::{Pixel, Rig, View1, View2};
+use accurate_match::ProposeParams;
 use accurate_traverse::WalkParams;
 use ndarray::Array2;
 
-use super::candidates::{ViewCandidates, free_ends};
-use super::start::start_from;
+use super::candidates::ViewCandidates;
+use super::score::Cuts;
+use super::search::Search;
+use super::suspicion::{Suspicion, suspicions};
 use crate::Error;
 
 /// How hard the joint choice looks.
@@ -28,6 +27,8 @@ pub struct RobustParams {
     pub clear_lead: f64,
     /// Fits that are carried to convergence before the last choice.
     pub finalists: usize,
+    /// Finalists that are repaired if none is good.
+    pub repaired: usize,
     /// A fit is good if it leaves less than this unexplained or outside.
     pub good_unexplained: f64,
     /// A fit is good if its mean squared residual is below this, px²; 1/18 at the truth.
@@ -44,11 +45,12 @@ impl RobustParams {
     pub const DEFAULT: Self = Self {
         walks: WalkParams::DEFAULT,
         propose: ProposeParams::DEFAULT,
-        max_fits: 40,
-        min_fits: 3,
-        enough_fits: 16,
+        max_fits: 24,
+        min_fits: 2,
+        enough_fits: 12,
         clear_lead: 2.5,
         finalists: 6,
+        repaired: 2,
         good_unexplained: 0.15,
         good_chi_per_point: 0.0575,
         good_distance_px: 1.0,
@@ -64,18 +66,17 @@ pub(crate) struct JointResult {
     pub(crate) coverage: [f64; 2],
     /// Mean Sampson distance of the chosen walks' alignment, px.
     pub(crate) mean_distance_px: f64,
-    /// Score of the best fit from another pair of walks, minus the chosen one's; infinite if there
-    /// is none.
+    /// Score of the best fit that is another curve, minus the chosen one's; infinite if there is
+    /// none.
     pub(crate) margin: f64,
     pub(crate) fits: usize,
+    /// Reasons to doubt the result; none for most right ones.
+    #[allow(dead_code, reason = "for the diagnostics")]
+    pub(crate) suspicions: Vec<Suspicion>,
 }
 
-struct Candidate {
-    proposal: Proposal,
-    fit: OutlineFit,
-    score: f64,
-    mean_distance_px: f64,
-}
+/// Curves nowhere farther apart than this do not compete, px.
+const RIVAL_PX: f64 = 5.0;
 
 /// Proposes, pairs, fits, judges.
 ///
@@ -87,146 +88,68 @@ pub(crate) fn reconstruct_masks(
     params: &RobustParams,
     case: &str,
 ) -> Result<JointResult, Error> {
-    let view1 = ViewCandidates::<View1>::of(&masks[0], &params.walks, case)?;
-    let view2 = ViewCandidates::<View2>::of(&masks[1], &params.walks, case)?;
-    let matching = |source| Error::Matching { case: case.to_owned(), source };
-    let angles = EpipolarAngle::new(rig);
-    let proposals = propose_pairs(&angles, &view1.signals(), &view2.signals(), &params.propose)
-        .map_err(matching)?;
-    let outlines = OutlinePair::new(&view1.outline, &view2.outline)
-        .with_bridges(&view1.bridges, &view2.bridges);
+    let mut view1 = ViewCandidates::<View1>::of(&masks[0], &params.walks, case)?;
+    let mut view2 = ViewCandidates::<View2>::of(&masks[1], &params.walks, case)?;
+    let (outline1, outline2) = (view1.outline.clone(), view2.outline.clone());
+    let outlines =
+        OutlinePair::new(&outline1, &outline2).with_bridges(&view1.bridges, &view2.bridges);
+    let cuts = Cuts::new(&view1.bridges, &view2.bridges);
+    let search = Search { outlines: &outlines, cuts: &cuts, rig, params, case };
 
-    let mut candidates: Vec<Candidate> = Vec::new();
-    for proposal in &proposals {
-        if candidates.len() >= params.max_fits || settled(&candidates, proposal, params) {
-            break;
+    let mut found = Vec::new();
+    let pairs = search.propose_and_fit(&view1, &view2, [0, 0], params.max_fits, &mut found)?;
+    let mut fits = found.len();
+    let mut finalists = search.finalists(found);
+    let is_good =
+        |list: &[super::score::Candidate]| list.first().is_some_and(|best| best.is_good(params));
+    if !is_good(&finalists) {
+        if let Some(best) = finalists.first().cloned() {
+            let mut more = Vec::new();
+            search.rewarded(&best, &mut view1, &mut view2, params.max_fits / 3, &mut more)?;
+            fits += more.len();
+            more.append(&mut finalists);
+            finalists = search.finalists(more);
         }
-        candidates.extend(judged(proposal, &view1, &view2, &outlines, rig, params));
+        let mended: Vec<_> =
+            finalists.iter().take(params.repaired).map(|c| search.repaired(c)).collect();
+        finalists.extend(mended);
+        finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
     }
-    let fits = candidates.len();
-    candidates.sort_by(|a, b| a.score.total_cmp(&b.score));
-    candidates.truncate(params.finalists);
-    for candidate in &mut candidates {
-        converge(candidate, &outlines, rig, params);
-    }
-    candidates.sort_by(|a, b| a.score.total_cmp(&b.score));
-    let margin = candidates
-        .iter()
-        .skip(1)
-        .find(|c| {
-            (c.proposal.i, c.proposal.j) != (candidates[0].proposal.i, candidates[0].proposal.j)
-        })
-        .map_or(f64::INFINITY, |c| c.score - candidates[0].score);
-    let Some(best) = candidates.into_iter().next() else {
+    let Some(best) = finalists.first() else {
         return Err(Error::NoCandidate {
             case: case.to_owned(),
             walks: [view1.walks.len(), view2.walks.len()],
-            pairs: proposals.len(),
+            pairs,
         });
     };
-    let fit = fit_outlines_adaptively(
+    let margin = finalists
+        .iter()
+        .find(|rival| !rival.shape.is_like(&best.shape, RIVAL_PX))
+        .map_or(f64::INFINITY, |rival| rival.score - best.score);
+    let chosen = fit_outlines_adaptively(
         &best.fit.curve,
         &outlines,
         rig,
-        &settled_params(),
+        &best.settled_params(),
         &AdaptiveParams::DEFAULT,
     )
-    .unwrap_or(best.fit);
-    let (i, j) = (best.proposal.i, best.proposal.j);
+    .map_or_else(|_| best.clone(), |fit| best.refitted(fit, &cuts, rig));
+    let [i, j] = chosen.walks;
+    let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
+    let unexplained = cuts.unexplained(&chosen.fit);
+    let suspicions = suspicions(&chosen, unexplained, margin, coverage);
     Ok(JointResult {
-        fit,
         walk1: view1.walks[i].points.clone(),
-        walk2: directed(&view2.walks[j].points, best.proposal.reversed),
-        coverage: [view1.walks[i].coverage, view2.walks[j].coverage],
-        mean_distance_px: best.mean_distance_px,
+        walk2: directed(&view2.walks[j].points, chosen.reversed),
+        coverage,
+        mean_distance_px: chosen.mean_distance_px,
         margin,
         fits,
+        suspicions,
+        fit: chosen.fit,
     })
 }
 
 fn directed(points: &[Pixel<View2>], reversed: bool) -> Vec<Pixel<View2>> {
     if reversed { points.iter().rev().copied().collect() } else { points.to_vec() }
-}
-
-fn good(judgement: &Judgement, mean_distance_px: f64, params: &RobustParams) -> bool {
-    judgement.unexplained + judgement.outside < params.good_unexplained
-        && judgement.chi_per_point() < params.good_chi_per_point
-        && mean_distance_px < params.good_distance_px
-}
-
-/// Whether a good fit is there and the next proposal is not worth a try.
-fn settled(candidates: &[Candidate], next: &Proposal, params: &RobustParams) -> bool {
-    let tried = candidates.len();
-    let best = candidates
-        .iter()
-        .filter(|c| good(&c.fit.judgement, c.mean_distance_px, params))
-        .map(|c| c.proposal.score)
-        .min_by(f64::total_cmp);
-    best.is_some_and(|best| {
-        tried >= params.enough_fits
-            || (tried >= params.min_fits && next.score > best + params.clear_lead)
-    })
-}
-
-/// The better of a plain and, unless that is good already, an annealed fit.
-fn judged(
-    proposal: &Proposal,
-    view1: &ViewCandidates<View1>,
-    view2: &ViewCandidates<View2>,
-    outlines: &OutlinePair<'_>,
-    rig: &Rig,
-    params: &RobustParams,
-) -> Option<Candidate> {
-    let (walk1, walk2) = (&view1.walks[proposal.i], &view2.walks[proposal.j]);
-    let spacing = OutlineFitParams::DEFAULT.knot_spacing_px;
-    let (start, mean_distance_px) = start_from(
-        (&walk1.points, free_ends(walk1)),
-        (&walk2.points, free_ends(walk2)),
-        proposal.reversed,
-        rig,
-        spacing,
-    )?;
-    let plain = fit_outlines(&start, outlines, rig, &OutlineFitParams::DEFAULT).ok();
-    let fit = match plain {
-        Some(fit) if good(&fit.judgement, mean_distance_px, params) => fit,
-        plain => {
-            let annealed = fit_outlines(&start, outlines, rig, &OutlineFitParams::ANNEALED).ok();
-            [plain, annealed]
-                .into_iter()
-                .flatten()
-                .min_by(|a, b| a.judgement.score().total_cmp(&b.judgement.score()))?
-        }
-    };
-    let walks_cost = walk1.cost.total() + walk2.cost.total();
-    let disagreement = (mean_distance_px - params.good_distance_px).max(0.0);
-    let score = fit.judgement.score() + params.walk_weight * walks_cost + disagreement;
-    Some(Candidate { proposal: *proposal, fit, score, mean_distance_px })
-}
-
-/// Carries a fit on with its last settings; ranking before convergence picks wrong loops.
-fn converge(
-    candidate: &mut Candidate,
-    outlines: &OutlinePair<'_>,
-    rig: &Rig,
-    _params: &RobustParams,
-) {
-    let Ok(fit) = fit_outlines(&candidate.fit.curve, outlines, rig, &settled_params()) else {
-        return;
-    };
-    let gain = candidate.fit.judgement.score() - fit.judgement.score();
-    if gain > 0.0 {
-        candidate.score -= gain;
-        candidate.fit = fit;
-    }
-}
-
-/// For a start that is a fit already: its last settings from the first step on.
-fn settled_params() -> OutlineFitParams {
-    let d = OutlineFitParams::DEFAULT;
-    OutlineFitParams {
-        cauchy_scale_start_px: d.cauchy_scale_px,
-        subsample: false,
-        iterations: 8,
-        ..d
-    }
 }

@@ -3,7 +3,13 @@
 
 mod candidates;
 mod joint;
+mod repair;
+mod score;
+mod search;
+mod shape;
 mod start;
+mod suspicion;
 
 pub use joint::RobustParams;
 pub(crate) use joint::{JointResult, reconstruct_masks};
+pub use suspicion::Suspicion;

@@ -1,0 +1,181 @@
+//! How well `accurate` does on generated masks, case by case, beside a fit that starts from the truth:
+//! `cargo run -p accurate3d --example joint_study -- hard 1000 24 [--discs 1] [--turn 0.05] [--shift 0.3]`.
+//!
+//! Every line shows what the method says about itself (un, off, chi per point, margin, mean epipolar
+//! distance) and what the truth says (Hausdorff in px, Overall and Max of the table in world units).
+//! `oracle` is the score of the fit that starts from the truth: a wrong result with a *higher* score
+//! was not found by the search, one with a lower score was preferred to the truth.
+#![allow(clippy::print_stdout)]
+
+use std::error::Error;
+use std::str::FromStr;
+use std::time::Instant;
+
+use accurate3d::eval::{curve_scores, table_scores};
+use accurate3d::fit::{Outline, OutlineFitParams, OutlinePair, fit_outlines, judge_curve};
+use accurate3d::geom::{Curve3, Point3, Rig, View1, View2};
+use accurate3d::synth::{CalibrationError, CaseOptions, Family, generate};
+use accurate3d::{InputKind, Method, Params, ViewPair, reconstruct};
+use rayon::prelude::*;
+
+struct Line {
+    text: String,
+    hausdorff_px: f64,
+    overall_px: f64,
+    table: [f64; 2],
+    seconds: f64,
+    suspect: bool,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let (options_from, quiet) =
+        (args.iter().position(|a| a.starts_with("--")), has(&args, "--quiet"));
+    let plain = &args[..options_from.unwrap_or(args.len())];
+    let [family, seed, cases, ..] = plain else {
+        return Err("give a family, a seed and a number of cases".into());
+    };
+    let (family, seed, cases) = (Family::from_str(family)?, seed.parse()?, cases.parse::<u64>()?);
+    let from = plain.get(3).map_or(Ok(0), |first| first.parse::<u64>())?;
+    let discs = number(&args, "--discs")?.unwrap_or(0.0) as u32;
+    let (turn, shift) = (number(&args, "--turn")?, number(&args, "--shift")?);
+    let options = CaseOptions {
+        occlusion_discs: discs.min(1)..=discs,
+        calibration_error: (turn.is_some() || shift.is_some()).then(|| CalibrationError {
+            rotation_deg: turn.unwrap_or(0.0),
+            shift_px: shift.unwrap_or(0.0),
+        }),
+        ..CaseOptions::default()
+    };
+    let lines: Vec<Line> = (from..from + cases)
+        .into_par_iter()
+        .map(|index| study(family, seed, index, &options).map_err(|e| format!("{index}: {e}")))
+        .collect::<Result<_, _>>()?;
+    if !quiet {
+        lines.iter().for_each(|line| println!("{}", line.text));
+    }
+    summary(&lines);
+    Ok(())
+}
+
+fn has(args: &[String], name: &str) -> bool {
+    args.iter().any(|a| a == name)
+}
+
+fn number(args: &[String], name: &str) -> Result<Option<f64>, Box<dyn Error>> {
+    let value = args.iter().position(|a| a == name).and_then(|at| args.get(at + 1));
+    Ok(value.map(|v| v.parse()).transpose()?)
+}
+
+fn study(
+    family: Family,
+    seed: u64,
+    index: u64,
+    options: &CaseOptions,
+) -> Result<Line, Box<dyn Error + Send + Sync>> {
+    let case = generate(family, seed, index, options)?;
+    let (rig, truth) = (case.rig.clone(), case.truth.clone());
+    let [mask1, mask2] = case.masks.clone();
+    let pair = ViewPair::from(case);
+    let clock = Instant::now();
+    let found = reconstruct(&pair, &Params::new(InputKind::Mask, Method::Accurate))?;
+    let seconds = clock.elapsed().as_secs_f64();
+
+    let curve = found.positions();
+    let unit_per_px = world_per_px(&rig, &truth);
+    let scores = curve_scores(&curve, &truth, 0.5 * unit_per_px)?;
+    let table = table_scores(&curve, &truth)?;
+    let (one, two) =
+        (Outline::<View1>::from_mask(mask1.view())?, Outline::<View2>::from_mask(mask2.view())?);
+    let outlines = OutlinePair::new(&one, &two);
+    let fitted = |points: &[Point3]| {
+        let sparse: Vec<_> = points.iter().step_by(5).copied().collect();
+        Curve3::interpolate(&sparse).ok()
+    };
+    let oracle = fitted(&truth)
+        .and_then(|t| fit_outlines(&t, &outlines, &rig, &OutlineFitParams::DEFAULT).ok())
+        .map_or_else(
+            || "none".to_owned(),
+            |fit| {
+                let j = fit.judgement;
+                let score = j.score() - 5.0 * j.bending;
+                format!(
+                    "{score:7.2} un {:.2} off {:.2} {:.4}",
+                    j.unexplained,
+                    j.outside,
+                    j.chi_per_point()
+                )
+            },
+        );
+    let own = fitted(&curve)
+        .and_then(|c| judge_curve(&c, &outlines, &rig, &OutlineFitParams::DEFAULT).ok())
+        .map_or(f64::NAN, |j| j.score() - 5.0 * j.bending);
+
+    let d = &found.diagnostics;
+    let o = d.outline.ok_or("no outline diagnostics")?;
+    let hausdorff_px = scores.hausdorff / unit_per_px;
+    let suspect = false;
+    let text = format!(
+        "{index:3} {:6.0} ms fits {:3} un {:6.2} off {:6.2} chi {:.4} margin {:7.2} dist {:5.2} cov {:.3} {:.3} | H {hausdorff_px:6.2} px overall {:.3} px table {:.3} {:.2} | F {own:7.2} oracle {oracle}{}{}",
+        1e3 * seconds,
+        o.fits,
+        o.unexplained,
+        o.outside,
+        o.chi_per_point,
+        o.margin.unwrap_or(f64::INFINITY),
+        d.mean_epipolar_distance_px,
+        d.trace_coverage[0],
+        d.trace_coverage[1],
+        scores.overall / unit_per_px,
+        table.overall,
+        table.max_error,
+        if hausdorff_px > 5.0 { " WRONG" } else { "" },
+        if suspect { " suspect" } else { "" },
+    );
+    Ok(Line {
+        text,
+        hausdorff_px,
+        overall_px: scores.overall / unit_per_px,
+        table: [table.overall, table.max_error],
+        seconds,
+        suspect,
+    })
+}
+
+fn world_per_px(rig: &Rig, truth: &[Point3]) -> f64 {
+    let depth = |camera: &accurate3d::geom::Camera| {
+        let sum: f64 = truth.iter().map(|p| camera.depth(p)).sum();
+        sum / truth.len() as f64 / camera.k()[(0, 0)].abs()
+    };
+    (depth(rig.camera1()) + depth(rig.camera2())) / 2.0
+}
+
+fn summary(lines: &[Line]) {
+    let n = lines.len() as f64;
+    let quantile = |value: fn(&Line) -> f64, q: f64| {
+        let mut values: Vec<f64> = lines.iter().map(value).collect();
+        values.sort_by(f64::total_cmp);
+        values[((values.len() - 1) as f64 * q).round() as usize]
+    };
+    let mean = |value: fn(&Line) -> f64| lines.iter().map(value).sum::<f64>() / n;
+    let below = |px: f64| lines.iter().filter(|l| l.hausdorff_px < px).count() as f64 / n;
+    println!(
+        "n {n} below 5/2/1 px {:.3} {:.3} {:.3} | Hausdorff px median {:.2} p95 {:.2} | Overall px median {:.3} | table Overall mean {:.4} Max mean {:.3} | ms median {:.0} p95 {:.0}",
+        below(5.0),
+        below(2.0),
+        below(1.0),
+        quantile(|l| l.hausdorff_px, 0.5),
+        quantile(|l| l.hausdorff_px, 0.95),
+        quantile(|l| l.overall_px, 0.5),
+        mean(|l| l.table[0]),
+        mean(|l| l.table[1]),
+        1e3 * quantile(|l| l.seconds, 0.5),
+        1e3 * quantile(|l| l.seconds, 0.95),
+    );
+    let wrong = lines.iter().filter(|l| l.hausdorff_px > 5.0).count();
+    let (missed, alarms) = (
+        lines.iter().filter(|l| l.hausdorff_px > 5.0 && !l.suspect).count(),
+        lines.iter().filter(|l| l.hausdorff_px <= 5.0 && l.suspect).count(),
+    );
+    println!("wrong {wrong}, of these not flagged {missed}; right but flagged {alarms}");
+}

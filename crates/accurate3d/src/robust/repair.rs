@@ -1,0 +1,141 @@
+use accurate_fit::{OutlineFitParams, start_curve};
+use accurate_geom::{Curve3, Point3, View1, View2};
+
+use super::candidates::ViewCandidates;
+use super::score::Candidate;
+use super::search::Search;
+use super::shape::{dense, px_per_unit};
+use crate::Error;
+
+/// Rounds of repair at most.
+const ROUNDS: usize = 5;
+/// A move must lower the score by this to count.
+const GAIN: f64 = 0.5;
+/// By how much an end is moved, px: longer and shorter.
+const LONGER_PX: [f64; 3] = [10.0, 25.0, 50.0];
+const SHORTER_PX: [f64; 2] = [8.0, 20.0];
+
+impl Search<'_> {
+    /// Moves that repair what a fit cannot mend by itself: an end too short or too long, knots too
+    /// far apart for a J tip, a stretch on the wrong strand. The best is taken until none helps.
+    pub(crate) fn repaired(&self, candidate: &Candidate) -> Candidate {
+        let mut best = candidate.clone();
+        for _ in 0..ROUNDS {
+            if best.is_good(self.params) {
+                break;
+            }
+            let next = self
+                .moves(&best)
+                .into_iter()
+                .min_by(|a, b| a.score.total_cmp(&b.score))
+                .filter(|next| next.score < best.score - GAIN);
+            match next {
+                Some(next) => best = self.with_finer_knots(self.converged(&next)),
+                None => break,
+            }
+        }
+        best
+    }
+
+    fn moves(&self, from: &Candidate) -> Vec<Candidate> {
+        let curve = &from.fit.curve;
+        let plain = OutlineFitParams {
+            knot_spacing_px: from.settled_params().knot_spacing_px,
+            ..OutlineFitParams::DEFAULT
+        };
+        let refit = |start: Option<Curve3>, params: &OutlineFitParams| {
+            let fit = self.fit(&start?, params)?;
+            Some(from.refitted(fit, self.cuts, self.rig))
+        };
+        let mut moves: Vec<Option<Candidate>> =
+            vec![refit(Some(curve.clone()), &OutlineFitParams::ANNEALED)];
+        let points = dense(curve, self.rig);
+        let px_per_unit = px_per_unit(&points, self.rig);
+        for at_end in [false, true] {
+            for px in LONGER_PX.into_iter().chain(SHORTER_PX.map(|px| -px)) {
+                let moved = with_end_moved(&points, px_per_unit, at_end, px);
+                let start = moved.and_then(|points| through(&points, px_per_unit));
+                moves.push(refit(start, &plain));
+            }
+        }
+        moves.into_iter().flatten().collect()
+    }
+
+    /// New walks that want to pass twice where the best fit leaves outline unexplained, paired and
+    /// fitted.
+    pub(crate) fn rewarded(
+        &self,
+        best: &Candidate,
+        view1: &mut ViewCandidates<View1>,
+        view2: &mut ViewCandidates<View2>,
+        max_fits: usize,
+        found: &mut Vec<Candidate>,
+    ) -> Result<(), Error> {
+        let rewards = |view: u8| -> Vec<([f64; 2], f64)> {
+            const LEAST: f64 = 0.3;
+            const EVERY: usize = 30;
+            const WEIGHT: f64 = 1.0;
+            best.fit
+                .unexplained
+                .iter()
+                .filter(|stretch| stretch.view == view && stretch.unexplained > LEAST)
+                .flat_map(|stretch| stretch.points.iter().step_by(EVERY).map(|p| (*p, WEIGHT)))
+                .collect()
+        };
+        let (rewards1, rewards2) = (rewards(1), rewards(2));
+        let before = [view1.walks.len(), view2.walks.len()];
+        view1.walk(&self.params.walks, &rewards1, self.case)?;
+        view2.walk(&self.params.walks, &rewards2, self.case)?;
+        // New walks of one view with all of the other.
+        for from in [[before[0], 0], [0, before[1]]] {
+            if from[0] < view1.walks.len() && from[1] < view2.walks.len() && from != [0, 0] {
+                self.propose_and_fit(view1, view2, from, max_fits, found)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Points 1 px apart with one end moved along its tangent (`px` positive: outwards).
+fn with_end_moved(
+    points: &[Point3],
+    px_per_unit: f64,
+    at_end: bool,
+    px: f64,
+) -> Option<Vec<Point3>> {
+    /// The tangent is taken over so many points.
+    const TANGENT: usize = 8;
+    let mut points = points.to_vec();
+    if !at_end {
+        points.reverse();
+    }
+    let n = points.len();
+    if px < 0.0 {
+        let cut = (-px) as usize;
+        if n < cut + 30 {
+            return None;
+        }
+        points.truncate(n - cut);
+    } else {
+        let (last, before) = (points[n - 1], points[n.checked_sub(TANGENT + 1)?]);
+        let direction = (last - before).try_normalize(0.0)? / px_per_unit;
+        points.extend((1..=px as usize).map(|k| last + direction * k as f64));
+    }
+    if !at_end {
+        points.reverse();
+    }
+    Some(points)
+}
+
+/// A start for a fit through dense points.
+fn through(points: &[Point3], px_per_unit: f64) -> Option<Curve3> {
+    let mut length = 0.0;
+    let mut arc = Vec::with_capacity(points.len());
+    for (k, point) in points.iter().enumerate() {
+        if k > 0 {
+            length += (point - points[k - 1]).norm() * px_per_unit;
+        }
+        arc.push(length);
+    }
+    start_curve(points, &arc, OutlineFitParams::DEFAULT.knot_spacing_px).ok()
+}

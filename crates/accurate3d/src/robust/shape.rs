@@ -1,0 +1,125 @@
+use accurate_geom::{Camera, Curve3, Point3, Rig};
+
+/// Samples by which two curves are compared.
+const COMPARED: usize = 48;
+/// Curvature beyond which bending grows only in proportion to the turn, 1/px: a cusp in the image of
+/// a hairpin must not outweigh the whole outline.
+const SHARP_PER_PX: f64 = 0.1;
+
+/// What a curve looks like, to tell it from others without its spline.
+#[derive(Debug, Clone)]
+pub(crate) struct Shape {
+    samples: Vec<Point3>,
+    px_per_unit: f64,
+}
+
+impl Shape {
+    pub(crate) fn new(curve: &Curve3, rig: &Rig) -> Self {
+        let samples = curve.sample(COMPARED);
+        let px_per_unit = px_per_unit(&samples, rig);
+        Self { samples, px_per_unit }
+    }
+
+    /// Whether no sample is farther than `px` from its partner, in the same or the other direction.
+    pub(crate) fn is_like(&self, other: &Self, px: f64) -> bool {
+        let limit = px / self.px_per_unit;
+        let near = |(a, b): (&Point3, &Point3)| (a - b).norm() <= limit;
+        self.samples.iter().zip(&other.samples).all(near)
+            || self.samples.iter().zip(other.samples.iter().rev()).all(near)
+    }
+}
+
+/// Mean magnification of both views over the points.
+pub(crate) fn px_per_unit(points: &[Point3], rig: &Rig) -> f64 {
+    let one = |camera: &Camera| {
+        let k = camera.k();
+        let focal_px = (k[(0, 0)].abs() + k[(1, 1)].abs()) / 2.0;
+        points.iter().map(|p| focal_px / camera.depth(p).abs().max(f64::MIN_POSITIVE)).sum::<f64>()
+    };
+    (one(rig.camera1()) + one(rig.camera2())) / (2 * points.len().max(1)) as f64
+}
+
+/// `∫ min(κ, 0.1 / px) |dθ|`, 1/px: bending energy of a curve that may have cusps.
+pub(crate) fn bending(curve: &Curve3, rig: &Rig) -> f64 {
+    const PER_SPAN: usize = 6;
+    let px_per_unit = px_per_unit(&curve.sample(16), rig);
+    let breakpoints = curve.breakpoints();
+    let mut sum = 0.0;
+    for pair in breakpoints.windows(2) {
+        let width = (pair[1] - pair[0]) / PER_SPAN as f64;
+        for k in 0..PER_SPAN {
+            let jet = curve.jet(pair[0] + (k as f64 + 0.5) * width);
+            let speed = jet.first.norm();
+            let across = jet.first.cross(&jet.second).norm();
+            if speed > 0.0 {
+                let per_px = across / speed.powi(3) / px_per_unit;
+                let turn = (across / (speed * speed) * width).min(std::f64::consts::FRAC_PI_2);
+                sum += per_px.min(SHARP_PER_PX) * turn;
+            }
+        }
+    }
+    sum
+}
+
+/// Points about 1 px apart along a curve.
+pub(crate) fn dense(curve: &Curve3, rig: &Rig) -> Vec<Point3> {
+    let length_px = curve.arc_length() * px_per_unit(&curve.sample(16), rig);
+    curve.sample(length_px.ceil().clamp(8.0, 65_536.0) as usize + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use accurate_geom::{
+        ImageSize, LengthUnit, nalgebra::Matrix3, nalgebra::Rotation3, nalgebra::Vector3,
+    };
+
+    fn rig() -> Rig {
+        let k = Matrix3::new(1000.0, 0.0, 256.0, 0.0, 1000.0, 256.0, 0.0, 0.0, 1.0);
+        let size = ImageSize { width: 512, height: 512 };
+        let t = Vector3::new(0.0, 0.0, 1000.0);
+        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), 1.2);
+        let camera = |r: Matrix3<f64>| Camera::new(k, r, t, size).unwrap();
+        Rig::new(camera(Matrix3::identity()), camera(*turn.matrix()), LengthUnit::Unit).unwrap()
+    }
+
+    #[test]
+    fn a_circle_bends_by_its_angle_over_its_radius() {
+        let radius = 40.0;
+        let points: Vec<_> = (0..=60)
+            .map(|k| {
+                let a = std::f64::consts::PI * k as f64 / 60.0;
+                Point3::new(radius * a.cos(), radius * a.sin(), 0.0)
+            })
+            .collect();
+        let curve = Curve3::interpolate(&points).unwrap();
+        // One px per unit at the centre, within 4 % over the circle; natural ends add less than that.
+        let found = bending(&curve, &rig());
+        assert!((found / (std::f64::consts::PI / radius) - 1.0).abs() < 0.1, "{found}");
+    }
+
+    #[test]
+    fn a_cusp_costs_no_more_than_its_turn_at_the_sharpest_curvature() {
+        let points: Vec<_> = (0..=40)
+            .map(|k| Point3::new((f64::from(k) - 20.0).abs() * 5.0, 0.01 * f64::from(k), 0.0))
+            .collect();
+        let curve = Curve3::interpolate(&points).unwrap();
+        let found = bending(&curve, &rig());
+        // Half a turn, and at most as much again where the spline rings.
+        assert!(found < 2.0 * std::f64::consts::PI * SHARP_PER_PX, "{found}");
+    }
+
+    #[test]
+    fn a_curve_is_like_itself_reversed_and_unlike_one_that_is_moved() {
+        let curve = |x: f64| {
+            let points: Vec<_> = (0..30)
+                .map(|k| Point3::new(x + f64::from(k), f64::from(k * k) * 0.1, 3.0))
+                .collect();
+            Curve3::interpolate(&points).unwrap()
+        };
+        let rig = rig();
+        let here = Shape::new(&curve(0.0), &rig);
+        assert!(here.is_like(&Shape::new(&curve(0.0).reversed(), &rig), 0.1));
+        assert!(!here.is_like(&Shape::new(&curve(9.0), &rig), 3.0));
+    }
+}
