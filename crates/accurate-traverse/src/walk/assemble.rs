@@ -145,7 +145,7 @@ fn resample<V: View>(
         let flag = PointFlags { link: edge.link, reused: uses[half as usize / 2] > 1 };
         let side = half as usize % 2;
         for k in 1..edge.points.len() {
-            let (from, to) = (edge.from_end(side, k - 1), edge.from_end(side, k));
+            let (from, to) = (edge.near_end(side, k - 1), edge.near_end(side, k));
             let span = (to - from).norm();
             while points.len() < steps && points.len() as f64 * step <= arc + span {
                 let share = if span > 0.0 {
