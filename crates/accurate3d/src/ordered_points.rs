@@ -2,7 +2,7 @@ use accurate_fit::{FitError, PointFitParams, fit_points};
 use accurate_geom::{Pixel, View, View2};
 use accurate_match::{FreeMatch, FreeMatchParams, FreeMatcher, TangencyParams};
 
-use crate::sampled_curve::{along_epipolar_lines, sampled};
+use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled};
 use crate::{Diagnostics, Error, Params, Reconstruction, Traces, ViewPair};
 
 /// Our own method on ordered points: matched in the better direction with free ends and gaps, then
@@ -35,7 +35,8 @@ pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Recons
     };
     let (points, covariances, refusal) = match fit {
         Ok(fit) => {
-            let (points, covariances) = sampled(&fit.curve, Some(&fit.covariance), &pair.rig);
+            let SampledCurve { points, covariances } =
+                sampled(&fit.curve, Some(&fit.covariance), &pair.rig);
             (points, covariances, None)
         }
         Err(refusal @ (FitError::BadMatch { .. } | FitError::TooFewPoints { .. })) => {

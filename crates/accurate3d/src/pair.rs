@@ -1,5 +1,5 @@
-use accurate_geom::{Pixel, Point3, Rig, View1, View2};
-use accurate_io::Pair;
+use accurate_geom::{Point3, Rig};
+use accurate_io::{OrderedPoints, Pair};
 use accurate_synth::SynthCase;
 use ndarray::Array2;
 
@@ -14,7 +14,7 @@ pub struct ViewPair {
     /// The two cameras.
     pub rig: Rig,
     /// Ordered centreline points of both views.
-    pub points: Option<(Vec<Pixel<View1>>, Vec<Pixel<View2>>)>,
+    pub points: Option<OrderedPoints>,
     /// Binary masks of both views.
     pub masks: Option<[Array2<bool>; 2]>,
     /// Grey images of both views, raw values.

@@ -8,7 +8,7 @@ use ndarray::Array2;
 use crate::direction::runs_against;
 use crate::ordered_points::adjusted_points;
 use crate::robust::reconstruct_masks;
-use crate::sampled_curve::{along_epipolar_lines, sampled};
+use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled};
 use crate::{
     Diagnostics, Error, InputKind, Method, Reconstruction, RobustParams, Traces, ViewPair,
 };
@@ -115,7 +115,7 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         .as_ref()
         .ok_or_else(|| Error::MissingInput { case: pair.id.clone(), input: params.input })?;
     let result = reconstruct_masks(masks, &pair.rig, &params.robust, &pair.id)?;
-    let (points, covariances) =
+    let SampledCurve { points, covariances } =
         sampled(&result.fit.curve, result.fit.covariance.as_ref(), &pair.rig);
     let along_epipolar_line = along_epipolar_lines(&points, &pair.rig)
         .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;

@@ -7,11 +7,17 @@ use accurate_match::{CurvePoint, MatchError, TangencyParams, tangency_sines1, ta
 const OUTPUT_SPACING_PX: f64 = 0.5;
 
 /// A fitted curve as points with their projections, and the covariance of each.
+pub(crate) struct SampledCurve {
+    pub(crate) points: Vec<CurvePoint>,
+    pub(crate) covariances: Option<Vec<Matrix3<f64>>>,
+}
+
+/// Samples a fitted curve at equal arc lengths.
 pub(crate) fn sampled(
     curve: &Curve3,
     covariance: Option<&CurveCovariance>,
     rig: &Rig,
-) -> (Vec<CurvePoint>, Option<Vec<Matrix3<f64>>>) {
+) -> SampledCurve {
     let (from, to) = curve.domain();
     let pixels: Vec<_> = (0..=64)
         .filter_map(|k| rig.project(&curve.at(from + (to - from) * f64::from(k) / 64.0)).ok())
@@ -31,7 +37,7 @@ pub(crate) fn sampled(
         points.push(CurvePoint { position, pixel1, pixel2, epipolar_distance_px: 0.0 });
         covariances.extend(covariance.map(|covariance| covariance.at(t)));
     }
-    (points, covariance.is_some().then_some(covariances))
+    SampledCurve { points, covariances: covariance.is_some().then_some(covariances) }
 }
 
 /// Sine of the angle between curve and epipolar line below which a depth is carried over.

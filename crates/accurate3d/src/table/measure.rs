@@ -90,6 +90,9 @@ enum Scored {
     Polyline(CurveScores, f64),
 }
 
+/// The scores of a row on a case, or the case's id and why there are none.
+type CaseScore = Result<Scored, (String, String)>;
+
 /// A mean with its 95 % interval; a median or quantile has none and repeats its value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Figure {
@@ -150,7 +153,7 @@ pub fn measure(
     kind: super::ScoreKind,
     on_case: &(dyn Fn() + Sync),
 ) -> Result<Table, Error> {
-    let per_case: Vec<(LengthUnit, Vec<Result<Scored, (String, String)>>)> = (0..set.len())
+    let per_case: Vec<(LengthUnit, Vec<CaseScore>)> = (0..set.len())
         .into_par_iter()
         .map(|index| {
             let pair = set.case(index)?;
@@ -197,12 +200,7 @@ fn runnable(rows: &[Row]) -> impl Iterator<Item = (&Row, crate::Method)> {
     })
 }
 
-fn score(
-    pair: &ViewPair,
-    row: &Row,
-    method: crate::Method,
-    kind: super::ScoreKind,
-) -> Result<Scored, (String, String)> {
+fn score(pair: &ViewPair, row: &Row, method: crate::Method, kind: super::ScoreKind) -> CaseScore {
     let fail = |reason: String| (pair.id.clone(), reason);
     let truth = pair.truth.as_deref().ok_or_else(|| fail("the pair has no truth".to_owned()))?;
     let params = Params::new(row.input, method);
