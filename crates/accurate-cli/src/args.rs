@@ -48,8 +48,8 @@ Examples:
   accurate eval out/curve.csv --truth case_017/annotations/guidewire_3D.ply
   accurate table                                       the paper's table, beside its figures
 
-Exit codes: 0 done; 1 internal error; 2 wrong usage; 3 no reconstruction found; 65 bad input;
-66 input missing; 69 a needed part is not installed; 74 a file could not be read or written.";
+Exit codes: 0 done; 1 internal error; 2 wrong usage; 3 no reconstruction found;
+4 suspect result (--strict); 65 bad input; 66 input missing; 69 a needed part is not installed; 74 a file could not be read or written.";
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
@@ -87,6 +87,9 @@ pub struct ReconstructArgs {
     /// Also write picture.svg.
     #[arg(long)]
     pub picture: bool,
+    /// Exit with code 4 if a result is suspect; it is written all the same.
+    #[arg(long)]
+    pub strict: bool,
 }
 
 /// A curve file format.

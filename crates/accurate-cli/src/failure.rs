@@ -20,6 +20,7 @@ impl Failure {
     pub const INTERNAL: u8 = 1;
     pub const USAGE: u8 = 2;
     pub const NO_RECONSTRUCTION: u8 = 3;
+    pub const SUSPECT: u8 = 4;
     pub const BAD_INPUT: u8 = 65;
     pub const NO_INPUT: u8 = 66;
     pub const UNAVAILABLE: u8 = 69;

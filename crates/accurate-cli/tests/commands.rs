@@ -410,3 +410,22 @@ fn wrong_usage_has_its_own_exit_code() {
         assert_eq!(failure(accurate().args(args)).0, 2, "{args:?}");
     }
 }
+
+#[test]
+fn views_of_different_bodies_are_suspect() {
+    let dir = TempDir::new().unwrap();
+    let pair = copy_of("bend", dir.path());
+    fs::copy(samples().join("loop/masks/mask_R.png"), pair.join("masks/mask_R.png")).unwrap();
+    let run = |strict: bool| {
+        let mut command = accurate();
+        command.args(["reconstruct", "-i", "mask", "-o"]).arg(dir.path().join("out")).arg(&pair);
+        if strict {
+            command.arg("--strict");
+        }
+        command
+    };
+    assert!(stdout(&mut run(false)).contains("suspect"));
+    let (code, message) = failure(&mut run(true));
+    assert_eq!(code, 4, "{message}");
+    assert!(dir.path().join("out/curve.csv").is_file(), "a suspect result is still written");
+}

@@ -4,7 +4,7 @@ use accurate_match::{CurveReconstruction, FreeMatch};
 use serde::Serialize;
 
 use crate::Traces;
-use crate::robust::JointResult;
+use crate::robust::{JointResult, Suspicion};
 
 /// How far a reconstruction can be trusted, without knowing the truth.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,6 +28,8 @@ pub struct Diagnostics {
     /// Fraction of the points where the curve runs along an epipolar line (within 6 degrees, in
     /// either view): there depth is weakly seen.
     pub along_epipolar_line: f64,
+    /// Reasons to doubt the result; none for most right ones.
+    pub suspicions: Vec<Suspicion>,
     /// How well the curve explains both outlines, where it was fitted to them.
     pub outline: Option<OutlineDiagnostics>,
     /// Why ordered points were matched but not adjusted, if so.
@@ -61,6 +63,7 @@ impl Diagnostics {
             view2_reversed: false,
             dropped_pairs: 0,
             along_epipolar_line: share(along_epipolar_line),
+            suspicions: result.suspicions.clone(),
             outline: Some(OutlineDiagnostics {
                 unexplained: judgement.unexplained,
                 outside: judgement.outside,
@@ -91,6 +94,7 @@ impl Diagnostics {
             view2_reversed: matched.reversed,
             dropped_pairs: matched.dropped,
             along_epipolar_line: share(along_epipolar_line),
+            suspicions: suspicions(matched.mean_epipolar_distance_px, 1.0, [1.0; 2]),
             outline: None,
             not_adjusted,
         }
@@ -123,6 +127,7 @@ impl Diagnostics {
             view2_reversed: traces.view2_reversed,
             dropped_pairs: matched.dropped,
             along_epipolar_line: share(along_epipolar_line),
+            suspicions: suspicions(matched.mean_epipolar_distance_px(), 2.0, traces.coverage),
             outline: None,
             not_adjusted: None,
         }
@@ -131,4 +136,19 @@ impl Diagnostics {
 
 fn share(flags: &[bool]) -> f64 {
     flags.iter().filter(|f| **f).count() as f64 / flags.len().max(1) as f64
+}
+
+/// A trace that leaves out more of a skeleton than a few spurs.
+const LEAST_COVERAGE: f64 = 0.95;
+
+/// What ordered curves alone can tell: curves that belong together agree to a fraction of a pixel,
+/// wrong orders and directions are off by pixels.
+fn suspicions(mean_distance_px: f64, most_px: f64, coverage: [f64; 2]) -> Vec<Suspicion> {
+    [
+        (mean_distance_px > most_px, Suspicion::ViewsDisagree),
+        (coverage[0].min(coverage[1]) < LEAST_COVERAGE, Suspicion::Uncovered),
+    ]
+    .into_iter()
+    .filter_map(|(holds, reason)| holds.then_some(reason))
+    .collect()
 }

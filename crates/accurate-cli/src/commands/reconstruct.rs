@@ -18,7 +18,7 @@ use crate::text::{make_folder, write_text};
 pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
     let jobs = jobs(args)?;
     let bar = console.progress(jobs.len(), "reconstructing");
-    let results: Vec<Result<(String, Value), Failure>> = jobs
+    let results: Vec<Result<Done, Failure>> = jobs
         .par_iter()
         .map(|(dir, out)| {
             let result = one(dir, out, args);
@@ -29,15 +29,16 @@ pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
     bar.finish_and_clear();
     let total = results.len();
     let mut first_failure = None;
-    let mut failed = 0;
+    let (mut failed, mut suspect) = (0, Vec::new());
     for result in results {
         match result {
-            Ok((line, value)) => {
+            Ok(done) => {
                 if console.json {
-                    console.json(&value)?
+                    console.json(&done.json)?;
                 } else {
-                    console.data(&line)?
+                    console.data(&done.line)?;
                 }
+                suspect.extend(done.suspect);
             }
             Err(failure) => {
                 failed += 1;
@@ -49,10 +50,26 @@ pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
         }
     }
     match first_failure {
+        None if args.strict && !suspect.is_empty() => {
+            let message =
+                format!("{} of {total} results suspect: {}", suspect.len(), suspect.join(", "));
+            Err(Failure::new(Failure::SUSPECT, message)
+                .with_hint("look at the picture (--picture) before you use them"))
+        }
         None => Ok(()),
         Some(failure) if total == 1 => Err(failure),
         Some(failure) => Err(failure.about(format!("{failed} of {total} pairs failed"))),
     }
+}
+
+/// A written result.
+struct Done {
+    /// One line for a reader.
+    line: String,
+    /// The same as `result.json`.
+    json: Value,
+    /// The case, if there are reasons to doubt it.
+    suspect: Option<String>,
 }
 
 /// Pair folders with the folder each result goes to.
@@ -92,7 +109,7 @@ fn jobs(args: &ReconstructArgs) -> Result<Vec<(PathBuf, PathBuf)>, Failure> {
         .collect())
 }
 
-fn one(dir: &Path, out: &Path, args: &ReconstructArgs) -> Result<(String, Value), Failure> {
+fn one(dir: &Path, out: &Path, args: &ReconstructArgs) -> Result<Done, Failure> {
     let parts = PairParts {
         points: args.input == InputKind::Points,
         masks: args.input == InputKind::Mask,
@@ -103,7 +120,12 @@ fn one(dir: &Path, out: &Path, args: &ReconstructArgs) -> Result<(String, Value)
     let reconstruction = reconstruct(&pair, &Params::new(args.input, args.method))?;
     let result = result_json(dir, parts, &pair, &reconstruction)?;
     write_outputs(out, &pair, &reconstruction, &result, &args.also, args.picture)?;
-    Ok((summary(&reconstruction), result))
+    let doubted = !reconstruction.diagnostics.suspicions.is_empty();
+    Ok(Done {
+        line: summary(&reconstruction),
+        json: result,
+        suspect: doubted.then(|| reconstruction.id.clone()),
+    })
 }
 
 /// Writes the curve, its extra formats, the picture and last `result.json`.
@@ -172,8 +194,14 @@ pub fn result_json(
 /// One line for a reader.
 pub fn summary(reconstruction: &Reconstruction) -> String {
     let d = &reconstruction.diagnostics;
+    let suspect = if d.suspicions.is_empty() {
+        String::new()
+    } else {
+        let reasons: Vec<String> = d.suspicions.iter().map(|s| s.to_string()).collect();
+        format!(", suspect: {}", reasons.join(", "))
+    };
     format!(
-        "{}: {} points, {:.1} {}, mean epipolar distance {:.2} px, coverage {:.1} % / {:.1} %",
+        "{}: {} points, {:.1} {}, mean epipolar distance {:.2} px, coverage {:.1} % / {:.1} %{suspect}",
         reconstruction.id,
         reconstruction.points.len(),
         reconstruction.length(),

@@ -1,3 +1,5 @@
+use std::fmt;
+
 use serde::Serialize;
 
 use super::score::Candidate;
@@ -48,4 +50,17 @@ pub(crate) fn suspicions(
     .into_iter()
     .filter_map(|(holds, reason)| holds.then_some(reason))
     .collect()
+}
+
+impl fmt::Display for Suspicion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::UnexplainedOutline => "unexplained outline",
+            Self::OutsideMask => "curve outside the mask",
+            Self::Misfit => "misfit",
+            Self::Ambiguous => "ambiguous order",
+            Self::ViewsDisagree => "views disagree",
+            Self::Uncovered => "skeleton not covered",
+        })
+    }
 }
