@@ -97,13 +97,39 @@ impl DistanceMap {
         Self { x0, y0, width, height, nearest }
     }
 
-    /// The foreground pixel nearest to the pixel of the window nearest to `(x, y)`.
+    /// The foreground pixel nearest to `(x, y)`; beyond 1 px perhaps one that is up to 0.1 px farther.
+    ///
+    /// Looked up at the nearest pixel of the window, and at the others around `(x, y)` if that gives
+    /// more than a distance that is certainly right: on masks 1 px thick, half a pixel counts.
     pub(crate) fn nearest(&self, x: f64, y: f64) -> [f64; 2] {
+        /// The nearest pixel itself is never farther than half a diagonal.
+        const CERTAIN_PX: f64 = std::f64::consts::FRAC_1_SQRT_2;
+        let (mut best, mut least) = self.look_up(x, y, x.round(), y.round());
+        // So far away it is a matter of direction only.
+        if least > CERTAIN_PX && least < 8.0 {
+            for (cx, cy) in [
+                (x.floor(), y.floor()),
+                (x.floor() + 1.0, y.floor()),
+                (x.floor(), y.floor() + 1.0),
+                (x.floor() + 1.0, y.floor() + 1.0),
+            ] {
+                let (other, distance) = self.look_up(x, y, cx, cy);
+                if distance < least {
+                    (best, least) = (other, distance);
+                }
+            }
+        }
+        best
+    }
+
+    /// The foreground pixel nearest to the pixel at `(column, row)`, and its distance from `(x, y)`.
+    fn look_up(&self, x: f64, y: f64, column: f64, row: f64) -> ([f64; 2], f64) {
         // `as usize` saturates, so that far or non-finite positions stay in the window.
-        let column = (x.round() as usize).clamp(self.x0, self.x0 + self.width - 1) - self.x0;
-        let row = (y.round() as usize).clamp(self.y0, self.y0 + self.height - 1) - self.y0;
+        let column = (column as usize).clamp(self.x0, self.x0 + self.width - 1) - self.x0;
+        let row = (row as usize).clamp(self.y0, self.y0 + self.height - 1) - self.y0;
         let [qx, qy] = self.nearest[row * self.width + column];
-        [f64::from(qx), f64::from(qy)]
+        let found = [f64::from(qx), f64::from(qy)];
+        (found, (found[0] - x).hypot(found[1] - y))
     }
 }
 
