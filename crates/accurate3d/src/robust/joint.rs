@@ -52,7 +52,7 @@ impl RobustParams {
         finalists: 6,
         repaired: 2,
         good_unexplained: 0.15,
-        good_chi_per_point: 0.0575,
+        good_chi_per_point: 0.062,
         good_distance_px: 1.0,
         walk_weight: 0.3,
     };
@@ -91,8 +91,8 @@ pub(crate) fn reconstruct_masks(
     let mut view1 = ViewCandidates::<View1>::of(&masks[0], &params.walks, case)?;
     let mut view2 = ViewCandidates::<View2>::of(&masks[1], &params.walks, case)?;
     let (outline1, outline2) = (view1.outline.clone(), view2.outline.clone());
-    let outlines =
-        OutlinePair::new(&outline1, &outline2).with_bridges(&view1.bridges, &view2.bridges);
+    let outlines = OutlinePair::new(&outline1, &outline2)
+        .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));
     let cuts = Cuts::new(&view1.bridges, &view2.bridges);
     let search = Search { outlines: &outlines, cuts: &cuts, rig, params, case };
 
@@ -100,6 +100,9 @@ pub(crate) fn reconstruct_masks(
     let pairs = search.propose_and_fit(&view1, &view2, [0, 0], params.max_fits, &mut found)?;
     let mut fits = found.len();
     let mut finalists = search.finalists(found);
+    let mut more = search.from_other_starts(&finalists, &view1, &view2);
+    more.append(&mut finalists);
+    finalists = search.finalists(more);
     let is_good =
         |list: &[super::score::Candidate]| list.first().is_some_and(|best| best.is_good(params));
     if !is_good(&finalists) {
@@ -110,10 +113,15 @@ pub(crate) fn reconstruct_masks(
             more.append(&mut finalists);
             finalists = search.finalists(more);
         }
-        let mended: Vec<_> =
-            finalists.iter().take(params.repaired).map(|c| search.repaired(c)).collect();
-        finalists.extend(mended);
-        finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+        // All with the same freedom, or the freest would win.
+        let fine: Vec<_> = finalists.iter().filter_map(|c| search.finer(c)).collect();
+        finalists = search.finalists(fine);
+        if !is_good(&finalists) {
+            let mended: Vec<_> =
+                finalists.iter().take(params.repaired).map(|c| search.repaired(c)).collect();
+            finalists.extend(mended);
+            finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+        }
     }
     let Some(best) = finalists.first() else {
         return Err(Error::NoCandidate {
@@ -130,7 +138,7 @@ pub(crate) fn reconstruct_masks(
         &best.fit.curve,
         &outlines,
         rig,
-        &best.settled_params(),
+        &best.settings,
         &AdaptiveParams::DEFAULT,
     )
     .map_or_else(|_| best.clone(), |fit| best.refitted(fit, &cuts, rig));
@@ -148,6 +156,26 @@ pub(crate) fn reconstruct_masks(
         suspicions,
         fit: chosen.fit,
     })
+}
+
+/// The bridges twice as wide as they come: what hides the body hides how it bends there.
+fn corridors<V: accurate_geom::View>(
+    bridges: &[(Pixel<V>, Pixel<V>)],
+) -> Vec<(Pixel<V>, Pixel<V>)> {
+    const ASIDE_PX: f64 = 4.0;
+    const LONGEST_PX: f64 = 30.0;
+    let mut all = bridges.to_vec();
+    for (a, b) in bridges {
+        let length = a.distance(*b);
+        if length > 2.0 * ASIDE_PX && length < LONGEST_PX {
+            let (nx, ny) = ((b.y - a.y) / length * ASIDE_PX, (a.x - b.x) / length * ASIDE_PX);
+            for side in [-1.0, 1.0] {
+                let moved = |p: &Pixel<V>| Pixel::new(p.x + side * nx, p.y + side * ny);
+                all.push((moved(a), moved(b)));
+            }
+        }
+    }
+    all
 }
 
 fn directed(points: &[Pixel<View2>], reversed: bool) -> Vec<Pixel<View2>> {

@@ -30,7 +30,7 @@ impl Search<'_> {
                 .min_by(|a, b| a.score.total_cmp(&b.score))
                 .filter(|next| next.score < best.score - GAIN);
             match next {
-                Some(next) => best = self.with_finer_knots(self.converged(&next)),
+                Some(next) => best = self.converged(&next),
                 None => break,
             }
         }
@@ -40,7 +40,9 @@ impl Search<'_> {
     fn moves(&self, from: &Candidate) -> Vec<Candidate> {
         let curve = &from.fit.curve;
         let plain = OutlineFitParams {
-            knot_spacing_px: from.settled_params().knot_spacing_px,
+            knot_spacing_px: from.settings.knot_spacing_px,
+            lambda3: from.settings.lambda3,
+            lambda3_start: from.settings.lambda3,
             ..OutlineFitParams::DEFAULT
         };
         let refit = |start: Option<Curve3>, params: &OutlineFitParams| {

@@ -2,8 +2,8 @@ use accurate_fit::{OutlineFit, OutlineFitParams};
 use accurate_geom::{Pixel, Rig, View1, View2};
 
 use super::RobustParams;
-use super::search::{FINE_KNOTS_PX, settled_params};
-use super::shape::{Shape, bending, px_per_unit};
+use super::search::SETTLED;
+use super::shape::{Shape, bending};
 
 /// Ends of bridges, where the outline is the cut face of something that hides the body.
 pub(crate) struct Cuts {
@@ -12,8 +12,13 @@ pub(crate) struct Cuts {
 
 /// A stretch of outline that lies wholly this near to the end of a bridge is a cut face, px.
 const CUT_PX: f64 = 5.0;
-/// Weight of the bending in a score.
-const BENDING: f64 = 5.0;
+/// Weights in a score, all on half a squared px of residual. Of pairs of curves that explain the
+/// outlines, the less bent one is right more often: the other bends to serve the noise.
+const MISFIT: f64 = 2.0;
+const BENDING: f64 = 10.0;
+/// What a boundary point costs that the curve does not use, px²: what it would cost at the truth, so
+/// that losing points is no gain.
+const UNUSED_PX2: f64 = 1.0 / 18.0;
 
 impl Cuts {
     pub(crate) fn new(
@@ -50,7 +55,10 @@ pub(crate) struct Candidate {
     pub(crate) reversed: bool,
     pub(crate) fit: OutlineFit,
     pub(crate) shape: Shape,
-    knot_spacing_px: f64,
+    /// Settings for carrying the fit on.
+    pub(crate) settings: OutlineFitParams,
+    /// Whether it is good, perhaps only with finer knots.
+    pub(crate) good: bool,
     /// Outline left unexplained besides cut faces, and curve outside the masks.
     pub(crate) misfit: f64,
     /// Less is better.
@@ -87,7 +95,8 @@ impl Candidate {
             reversed: origin.reversed,
             shape: Shape::new(&fit.curve, rig),
             fit,
-            knot_spacing_px: 0.0,
+            settings: SETTLED,
+            good: false,
             misfit: 0.0,
             score: 0.0,
             prior,
@@ -107,31 +116,14 @@ impl Candidate {
     }
 
     fn judge(&mut self, cuts: &Cuts, rig: &Rig) {
-        let curve = &self.fit.curve;
-        let spans = curve.breakpoints().len().max(2) - 1;
-        self.knot_spacing_px =
-            1.3 * curve.arc_length() * px_per_unit(&curve.sample(16), rig) / spans as f64;
         let judgement = &self.fit.judgement;
         self.misfit = cuts.unexplained(&self.fit) + judgement.outside;
-        self.score = self.misfit
-            + 0.5 * judgement.chi
+        let total = |count: [usize; 2]| (count[0] + count[1]) as f64;
+        let unused = (total(judgement.points) - total(judgement.used)).max(0.0);
+        self.score = MISFIT * self.misfit
+            + 0.5 * (judgement.chi + UNUSED_PX2 * unused)
             + BENDING * bending(&self.fit.curve, rig)
             + self.prior;
-    }
-
-    /// Whether its knots are those for curves that bend much.
-    pub(crate) fn has_fine_knots(&self) -> bool {
-        self.knot_spacing_px < OutlineFitParams::DEFAULT.knot_spacing_px
-    }
-
-    /// Settings for carrying the fit on.
-    pub(crate) fn settled_params(&self) -> OutlineFitParams {
-        let spacing = if self.has_fine_knots() {
-            FINE_KNOTS_PX
-        } else {
-            OutlineFitParams::DEFAULT.knot_spacing_px
-        };
-        settled_params(spacing)
     }
 
     /// Whether nothing speaks against it.

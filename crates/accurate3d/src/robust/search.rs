@@ -1,18 +1,27 @@
 use accurate_fit::{OutlineFit, OutlineFitParams, OutlinePair, fit_outlines};
 use accurate_geom::{Curve3, EpipolarAngle, Pixel, Rig, View, View1, View2};
-use accurate_match::{Proposal, propose_pairs};
+use accurate_match::{FreeEnds, Proposal, propose_pairs};
 
 use super::RobustParams;
 use super::candidates::{ViewCandidates, free_ends};
 use super::score::{Candidate, Cuts, Origin};
-use super::start::start_from;
+use super::start::{OTHER_PRICES, PRICES, start_from};
 use crate::Error;
 
 /// Two curves that are nowhere farther apart than this are one, px.
 pub(crate) const SAME_PX: f64 = 2.0;
 
-/// Knots for curves that bend more than the usual ones can, px.
-pub(crate) const FINE_KNOTS_PX: f64 = 5.0;
+/// For a start that is a fit already: the last settings from the first step on.
+pub(crate) const SETTLED: OutlineFitParams = OutlineFitParams {
+    cauchy_scale_start_px: OutlineFitParams::DEFAULT.cauchy_scale_px,
+    subsample: false,
+    iterations: 8,
+    ..OutlineFitParams::DEFAULT
+};
+
+/// The same for curves that bend more than the usual knots and smoothness allow.
+pub(crate) const FINE: OutlineFitParams =
+    OutlineFitParams { knot_spacing_px: 4.0, lambda3: 0.03, lambda3_start: 0.03, ..SETTLED };
 
 /// Everything that stays the same while candidates come and go.
 pub(crate) struct Search<'a> {
@@ -58,11 +67,7 @@ impl Search<'_> {
 
     /// Whether a good fit is there and the next proposal is not worth a try.
     fn settled(&self, found: &[Candidate], tried: usize, next: &Proposal) -> bool {
-        let best = found
-            .iter()
-            .filter(|c| c.is_good(self.params))
-            .map(|c| c.proposal_score)
-            .min_by(f64::total_cmp);
+        let best = found.iter().filter(|c| c.good).map(|c| c.proposal_score).min_by(f64::total_cmp);
         best.is_some_and(|best| {
             tried >= self.params.enough_fits
                 || (tried >= self.params.min_fits && next.score > best + self.params.clear_lead)
@@ -78,6 +83,7 @@ impl Search<'_> {
     ) -> Option<Candidate> {
         let (walk1, walk2) = (&view1.walks[proposal.i], &view2.walks[proposal.j]);
         let (start, mean_distance_px) = start_from(
+            &PRICES,
             (&walk1.points, free_ends(walk1)),
             (&walk2.points, free_ends(walk2)),
             proposal.reversed,
@@ -93,30 +99,61 @@ impl Search<'_> {
         };
         let judge = |fit| Candidate::new(fit, &origin, self.cuts, self.rig, self.params);
         let plain = self.fit(&start, &OutlineFitParams::DEFAULT).map(judge);
-        let plain = plain.map(|candidate| self.with_finer_knots(candidate));
-        if plain.as_ref().is_some_and(|c| c.is_good(self.params)) {
-            return plain;
+        if let Some(mut plain) = plain.clone().filter(|c| c.is_good(self.params)) {
+            plain.good = true;
+            return Some(plain);
         }
         let annealed = self.fit(&start, &OutlineFitParams::ANNEALED).map(judge);
-        [plain, annealed].into_iter().flatten().min_by(|a, b| a.score.total_cmp(&b.score))
+        let best = [plain, annealed].into_iter().flatten();
+        best.min_by(|a, b| a.score.total_cmp(&b.score)).map(|candidate| self.checked(candidate))
     }
 
-    /// The candidate with knots half as far apart, if it nearly explains the outlines and they
-    /// explain more: a J tip bends more than the usual ones can.
-    pub(crate) fn with_finer_knots(&self, candidate: Candidate) -> Candidate {
+    /// Notes whether a candidate is good, perhaps with finer knots: a J tip bends more than the usual
+    /// ones can.
+    fn checked(&self, mut candidate: Candidate) -> Candidate {
         /// Beyond this it is not the knots.
         const MOST: f64 = 6.0;
-        const GAIN: f64 = 1.0;
-        if candidate.is_good(self.params) || candidate.misfit > MOST || candidate.has_fine_knots() {
-            return candidate;
-        }
-        match self.fit(&candidate.fit.curve, &settled_params(FINE_KNOTS_PX)) {
-            Some(fit) => {
-                let finer = candidate.refitted(fit, self.cuts, self.rig);
-                if finer.score < candidate.score - GAIN { finer } else { candidate }
+        candidate.good = candidate.is_good(self.params)
+            || (candidate.misfit < MOST
+                && self.finer(&candidate).is_some_and(|finer| finer.is_good(self.params)));
+        candidate
+    }
+
+    /// The candidate with knots and smoothness for curves that bend much.
+    pub(crate) fn finer(&self, candidate: &Candidate) -> Option<Candidate> {
+        let fit = self.fit(&candidate.fit.curve, &FINE)?;
+        let mut finer = candidate.refitted(fit, self.cuts, self.rig);
+        finer.settings = FINE;
+        Some(finer)
+    }
+
+    /// The first walk pairs again, matched from corner to corner with no free ends: some stretches along epipolar
+    /// lines come out otherwise.
+    pub(crate) fn from_other_starts(
+        &self,
+        finalists: &[Candidate],
+        view1: &ViewCandidates<View1>,
+        view2: &ViewCandidates<View2>,
+    ) -> Vec<Candidate> {
+        let mut more = Vec::new();
+        for candidate in finalists.iter().take(3) {
+            let [i, j] = candidate.walks;
+            let start = start_from(
+                &OTHER_PRICES,
+                (&view1.walks[i].points, FreeEnds::NONE),
+                (&view2.walks[j].points, FreeEnds::NONE),
+                candidate.reversed,
+                self.rig,
+                OutlineFitParams::DEFAULT.knot_spacing_px,
+            );
+            let Some((start, _)) = start else { continue };
+            for params in [OutlineFitParams::DEFAULT, OutlineFitParams::ANNEALED] {
+                if let Some(fit) = self.fit(&start, &params) {
+                    more.push(candidate.refitted(fit, self.cuts, self.rig));
+                }
             }
-            None => candidate,
         }
+        more
     }
 
     pub(crate) fn fit(&self, start: &Curve3, params: &OutlineFitParams) -> Option<OutlineFit> {
@@ -130,7 +167,7 @@ impl Search<'_> {
         const REST: f64 = 0.3;
         let mut best = candidate.clone();
         for _ in 0..ROUNDS {
-            let Some(fit) = self.fit(&best.fit.curve, &best.settled_params()) else { break };
+            let Some(fit) = self.fit(&best.fit.curve, &best.settings) else { break };
             let next = best.refitted(fit, self.cuts, self.rig);
             let gain = best.score - next.score;
             if gain > 0.0 {
@@ -158,18 +195,6 @@ impl Search<'_> {
         found = different(found);
         found.truncate(self.params.finalists);
         different(found.iter().map(|candidate| self.converged(candidate)).collect())
-    }
-}
-
-/// For a start that is a fit already: its last settings from the first step on.
-pub(crate) fn settled_params(knot_spacing_px: f64) -> OutlineFitParams {
-    let d = OutlineFitParams::DEFAULT;
-    OutlineFitParams {
-        knot_spacing_px,
-        cauchy_scale_start_px: d.cauchy_scale_px,
-        subsample: false,
-        iterations: 8,
-        ..d
     }
 }
 

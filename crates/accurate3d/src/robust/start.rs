@@ -4,8 +4,11 @@ use accurate_match::{FreeEnds, FreeMatchParams, FreeMatcher, MovePrices};
 
 /// Prices of the alignment that a fit starts from: a trimmed tip costs little, for only ends that a
 /// walk itself doubts may be trimmed.
-const PRICES: MovePrices =
+pub(crate) const PRICES: MovePrices =
     MovePrices { diagonal_weight: 2.0, step: 0.02, end_skip: 0.06, gap_open: 3.0, gap_skip: 0.9 };
+
+/// The same where steps cost next to nothing, so that only distances count.
+pub(crate) const OTHER_PRICES: MovePrices = MovePrices { diagonal_weight: 1.0, ..PRICES };
 
 /// A 3D curve from two walks, and the mean epipolar distance of their alignment, px.
 ///
@@ -13,6 +16,7 @@ const PRICES: MovePrices =
 /// are bridged; triangulated and smoothed. `None` if the pair gives no curve (nothing triangulates
 /// in front of both cameras, no length): such a pair is no candidate.
 pub(crate) fn start_from(
+    prices: &MovePrices,
     walk1: (&[Pixel<View1>], FreeEnds),
     walk2: (&[Pixel<View2>], FreeEnds),
     reversed: bool,
@@ -20,7 +24,7 @@ pub(crate) fn start_from(
     knot_spacing_px: f64,
 ) -> Option<(Curve3, f64)> {
     let matcher = FreeMatcher::new(FreeMatchParams {
-        prices: PRICES,
+        prices: *prices,
         free1: walk1.1,
         free2: walk2.1,
         ..FreeMatchParams::DEFAULT
