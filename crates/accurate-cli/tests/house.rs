@@ -140,6 +140,60 @@ fn no_source_file_is_a_drawer_for_everything() {
     }
 }
 
+#[test]
+fn every_law_that_the_paper_map_names_is_a_test() {
+    let map = fs::read_to_string(workspace().join("docs/paper-map.md")).unwrap();
+    let sources: String = crates()
+        .values()
+        .flat_map(|path| rust_files(path))
+        .map(|file| fs::read_to_string(file).unwrap())
+        .collect();
+    let mut laws = 0;
+    // Laws stand in the third column of every table, each between back quotes.
+    for line in map.lines().filter(|l| l.starts_with("| ")) {
+        let column = line.split(" | ").nth(2).unwrap_or("");
+        for name in column.split('`').skip(1).step_by(2).filter(|n| n.contains('_')) {
+            assert!(sources.contains(&format!("fn {name}")), "no test called {name}");
+            laws += 1;
+        }
+    }
+    assert!(laws > 30, "the table was not read: {laws} laws");
+}
+
+#[test]
+fn every_link_of_the_documents_leads_somewhere() {
+    let root = workspace();
+    let mut documents = vec![root.join("README.md"), root.join("ARCHITECTURE.md")];
+    documents.extend(markdown_files(&root.join("docs")));
+    let mut links = 0;
+    for document in documents {
+        let text = fs::read_to_string(&document).unwrap();
+        for target in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let file = target.split('#').next().unwrap();
+            if file.is_empty() || file.contains("://") {
+                continue;
+            }
+            let path = document.parent().unwrap().join(file);
+            assert!(path.exists(), "{}: {target}", document.display());
+            links += 1;
+        }
+    }
+    assert!(links > 10, "no links were read: {links}");
+}
+
+fn markdown_files(dir: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files.extend(markdown_files(&path));
+        } else if path.extension().is_some_and(|e| e == "md") {
+            files.push(path);
+        }
+    }
+    files
+}
+
 fn rust_files(dir: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in fs::read_dir(dir).unwrap() {
