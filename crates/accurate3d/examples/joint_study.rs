@@ -114,7 +114,7 @@ fn study(
     let d = &found.diagnostics;
     let o = d.outline.ok_or("no outline diagnostics")?;
     let hausdorff_px = scores.hausdorff / unit_per_px;
-    let suspect = false;
+    let suspect = !d.suspicions.is_empty();
     let text = format!(
         "{index:3} {:6.0} ms fits {:3} un {:6.2} off {:6.2} chi {:.4} margin {:7.2} dist {:5.2} cov {:.3} {:.3} | H {hausdorff_px:6.2} px overall {:.3} px table {:.3} {:.2} | F {own:7.2} oracle {oracle}{}{}",
         1e3 * seconds,
@@ -130,7 +130,7 @@ fn study(
         table.overall,
         table.max_error,
         if hausdorff_px > 5.0 { " WRONG" } else { "" },
-        if suspect { " suspect" } else { "" },
+        if suspect { format!(" suspect {:?}", d.suspicions) } else { String::new() },
     );
     Ok(Line {
         text,

@@ -90,6 +90,20 @@ impl<V: View> ViewCandidates<V> {
         Ok(())
     }
 
+    /// Where a walk takes bridges: both ends of each.
+    pub(crate) fn cut_ends(&self, walk: usize) -> Vec<[f64; 2]> {
+        let edges = self.graph.edges();
+        self.walks[walk]
+            .halves
+            .iter()
+            .map(|half| &edges[half.edge])
+            .filter(|edge| edge.link)
+            .flat_map(|edge| [edge.points.first(), edge.points.last()])
+            .flatten()
+            .map(|p| [p.x + self.origin[0], p.y + self.origin[1]])
+            .collect()
+    }
+
     /// The walks from number `from` on as candidates for pairing.
     pub(crate) fn signals(&self, from: usize) -> Vec<SignalCurve<'_, V>> {
         self.walks[from..]

@@ -5,7 +5,6 @@ use accurate_traverse::WalkParams;
 use ndarray::Array2;
 
 use super::candidates::ViewCandidates;
-use super::score::Cuts;
 use super::search::Search;
 use super::suspicion::{Suspicion, suspicions};
 use crate::Error;
@@ -51,7 +50,7 @@ impl RobustParams {
         clear_lead: 2.5,
         finalists: 6,
         repaired: 2,
-        good_unexplained: 0.15,
+        good_unexplained: 0.03,
         good_chi_per_point: 0.062,
         good_distance_px: 1.0,
         walk_weight: 0.3,
@@ -93,8 +92,7 @@ pub(crate) fn reconstruct_masks(
     let (outline1, outline2) = (view1.outline.clone(), view2.outline.clone());
     let outlines = OutlinePair::new(&outline1, &outline2)
         .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));
-    let cuts = Cuts::new(&view1.bridges, &view2.bridges);
-    let search = Search { outlines: &outlines, cuts: &cuts, rig, params, case };
+    let search = Search { outlines: &outlines, rig, params, case };
 
     let mut found = Vec::new();
     let pairs = search.propose_and_fit(&view1, &view2, [0, 0], params.max_fits, &mut found)?;
@@ -141,11 +139,10 @@ pub(crate) fn reconstruct_masks(
         &best.settings,
         &AdaptiveParams::DEFAULT,
     )
-    .map_or_else(|_| best.clone(), |fit| best.refitted(fit, &cuts, rig));
+    .map_or_else(|_| best.clone(), |fit| best.refitted(fit, rig));
     let [i, j] = chosen.walks;
     let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
-    let unexplained = cuts.unexplained(&chosen.fit);
-    let suspicions = suspicions(&chosen, unexplained, margin, coverage);
+    let suspicions = suspicions(&chosen, margin, coverage);
     Ok(JointResult {
         walk1: view1.walks[i].points.clone(),
         walk2: directed(&view2.walks[j].points, chosen.reversed),

@@ -47,7 +47,7 @@ impl Search<'_> {
         };
         let refit = |start: Option<Curve3>, params: &OutlineFitParams| {
             let fit = self.fit(&start?, params)?;
-            Some(from.refitted(fit, self.cuts, self.rig))
+            Some(from.refitted(fit, self.rig))
         };
         let mut moves: Vec<Option<Candidate>> =
             vec![refit(Some(curve.clone()), &OutlineFitParams::ANNEALED)];

@@ -1,17 +1,14 @@
 use accurate_fit::{OutlineFit, OutlineFitParams};
-use accurate_geom::{Pixel, Rig, View1, View2};
+use accurate_geom::Rig;
 
 use super::RobustParams;
 use super::search::SETTLED;
 use super::shape::{Shape, bending};
 
-/// Ends of bridges, where the outline is the cut face of something that hides the body.
-pub(crate) struct Cuts {
-    at: [Vec<[f64; 2]>; 2],
-}
-
 /// A stretch of outline that lies wholly this near to the end of a bridge is a cut face, px.
 const CUT_PX: f64 = 5.0;
+/// A cut face leaves no more than this unexplained.
+const CUT_UNEXPLAINED: f64 = 0.3;
 /// Weights in a score, all on half a squared px of residual. Of pairs of curves that explain the
 /// outlines, the less bent one is right more often: the other bends to serve the noise.
 const MISFIT: f64 = 2.0;
@@ -20,31 +17,24 @@ const BENDING: f64 = 10.0;
 /// that losing points is no gain.
 const UNUSED_PX2: f64 = 1.0 / 18.0;
 
-impl Cuts {
-    pub(crate) fn new(
-        bridges1: &[(Pixel<View1>, Pixel<View1>)],
-        bridges2: &[(Pixel<View2>, Pixel<View2>)],
-    ) -> Self {
-        let at1 = bridges1.iter().flat_map(|(a, b)| [[a.x, a.y], [b.x, b.y]]).collect();
-        let at2 = bridges2.iter().flat_map(|(a, b)| [[a.x, a.y], [b.x, b.y]]).collect();
-        Self { at: [at1, at2] }
-    }
+/// Where a walk takes a bridge, `[x, y]`, by view: there the outline is the cut face of something that
+/// hides the body.
+pub(crate) type CutEnds = [Vec<[f64; 2]>; 2];
 
-    /// What a fit leaves unexplained besides cut faces.
-    pub(crate) fn unexplained(&self, fit: &OutlineFit) -> f64 {
-        let cut = |view: u8, points: &[[f64; 2]]| {
-            self.at[usize::from(view == 2)]
-                .iter()
-                .any(|[x, y]| points.iter().all(|[px, py]| (px - x).hypot(py - y) < CUT_PX))
-        };
-        let faces: f64 = fit
-            .unexplained
+/// What a fit leaves unexplained besides cut faces.
+fn unexplained(fit: &OutlineFit, cuts: &CutEnds) -> f64 {
+    let cut = |view: u8, points: &[[f64; 2]]| {
+        cuts[usize::from(view == 2)]
             .iter()
-            .filter(|stretch| cut(stretch.view, &stretch.points))
-            .map(|stretch| stretch.unexplained)
-            .sum();
-        (fit.judgement.unexplained - faces).max(0.0)
-    }
+            .any(|[x, y]| points.iter().all(|[px, py]| (px - x).hypot(py - y) < CUT_PX))
+    };
+    let faces: f64 = fit
+        .unexplained
+        .iter()
+        .filter(|stretch| cut(stretch.view, &stretch.points))
+        .map(|stretch| stretch.unexplained.min(CUT_UNEXPLAINED))
+        .sum();
+    (fit.judgement.unexplained - faces).max(0.0)
 }
 
 /// A fitted curve with all that counts in the choice.
@@ -53,6 +43,7 @@ pub(crate) struct Candidate {
     /// Index of the walk of each view, and whether the second runs against the first.
     pub(crate) walks: [usize; 2],
     pub(crate) reversed: bool,
+    cuts: CutEnds,
     pub(crate) fit: OutlineFit,
     pub(crate) shape: Shape,
     /// Settings for carrying the fit on.
@@ -71,9 +62,10 @@ pub(crate) struct Candidate {
 }
 
 /// What a candidate was before it was fitted.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Origin {
     pub(crate) walks: [usize; 2],
+    pub(crate) cuts: CutEnds,
     pub(crate) reversed: bool,
     pub(crate) walks_cost: f64,
     pub(crate) mean_distance_px: f64,
@@ -81,18 +73,13 @@ pub(crate) struct Origin {
 }
 
 impl Candidate {
-    pub(crate) fn new(
-        fit: OutlineFit,
-        origin: &Origin,
-        cuts: &Cuts,
-        rig: &Rig,
-        params: &RobustParams,
-    ) -> Self {
+    pub(crate) fn new(fit: OutlineFit, origin: &Origin, rig: &Rig, params: &RobustParams) -> Self {
         let disagreement = (origin.mean_distance_px - params.good_distance_px).max(0.0);
         let prior = params.walk_weight * origin.walks_cost + disagreement;
         let mut candidate = Self {
             walks: origin.walks,
             reversed: origin.reversed,
+            cuts: origin.cuts.clone(),
             shape: Shape::new(&fit.curve, rig),
             fit,
             settings: SETTLED,
@@ -103,21 +90,21 @@ impl Candidate {
             mean_distance_px: origin.mean_distance_px,
             proposal_score: origin.proposal_score,
         };
-        candidate.judge(cuts, rig);
+        candidate.judge(rig);
         candidate
     }
 
     /// The same origin with another fit.
-    pub(crate) fn refitted(&self, fit: OutlineFit, cuts: &Cuts, rig: &Rig) -> Self {
+    pub(crate) fn refitted(&self, fit: OutlineFit, rig: &Rig) -> Self {
         let shape = Shape::new(&fit.curve, rig);
         let mut candidate = Self { fit, shape, ..self.clone() };
-        candidate.judge(cuts, rig);
+        candidate.judge(rig);
         candidate
     }
 
-    fn judge(&mut self, cuts: &Cuts, rig: &Rig) {
+    fn judge(&mut self, rig: &Rig) {
         let judgement = &self.fit.judgement;
-        self.misfit = cuts.unexplained(&self.fit) + judgement.outside;
+        self.misfit = unexplained(&self.fit, &self.cuts) + judgement.outside;
         let total = |count: [usize; 2]| (count[0] + count[1]) as f64;
         let unused = (total(judgement.points) - total(judgement.used)).max(0.0);
         self.score = MISFIT * self.misfit

@@ -4,7 +4,7 @@ use accurate_match::{FreeEnds, Proposal, propose_pairs};
 
 use super::RobustParams;
 use super::candidates::{ViewCandidates, free_ends};
-use super::score::{Candidate, Cuts, Origin};
+use super::score::{Candidate, Origin};
 use super::start::{OTHER_PRICES, PRICES, start_from};
 use crate::Error;
 
@@ -26,7 +26,6 @@ pub(crate) const FINE: OutlineFitParams =
 /// Everything that stays the same while candidates come and go.
 pub(crate) struct Search<'a> {
     pub(crate) outlines: &'a OutlinePair<'a>,
-    pub(crate) cuts: &'a Cuts,
     pub(crate) rig: &'a Rig,
     pub(crate) params: &'a RobustParams,
     pub(crate) case: &'a str,
@@ -93,11 +92,12 @@ impl Search<'_> {
         let origin = Origin {
             walks: [proposal.i, proposal.j],
             reversed: proposal.reversed,
+            cuts: [view1.cut_ends(proposal.i), view2.cut_ends(proposal.j)],
             walks_cost: walk1.cost.total() + walk2.cost.total(),
             mean_distance_px,
             proposal_score: proposal.score,
         };
-        let judge = |fit| Candidate::new(fit, &origin, self.cuts, self.rig, self.params);
+        let judge = |fit| Candidate::new(fit, &origin, self.rig, self.params);
         let plain = self.fit(&start, &OutlineFitParams::DEFAULT).map(judge);
         if let Some(mut plain) = plain.clone().filter(|c| c.is_good(self.params)) {
             plain.good = true;
@@ -122,7 +122,7 @@ impl Search<'_> {
     /// The candidate with knots and smoothness for curves that bend much.
     pub(crate) fn finer(&self, candidate: &Candidate) -> Option<Candidate> {
         let fit = self.fit(&candidate.fit.curve, &FINE)?;
-        let mut finer = candidate.refitted(fit, self.cuts, self.rig);
+        let mut finer = candidate.refitted(fit, self.rig);
         finer.settings = FINE;
         Some(finer)
     }
@@ -149,7 +149,7 @@ impl Search<'_> {
             let Some((start, _)) = start else { continue };
             for params in [OutlineFitParams::DEFAULT, OutlineFitParams::ANNEALED] {
                 if let Some(fit) = self.fit(&start, &params) {
-                    more.push(candidate.refitted(fit, self.cuts, self.rig));
+                    more.push(candidate.refitted(fit, self.rig));
                 }
             }
         }
@@ -168,7 +168,7 @@ impl Search<'_> {
         let mut best = candidate.clone();
         for _ in 0..ROUNDS {
             let Some(fit) = self.fit(&best.fit.curve, &best.settings) else { break };
-            let next = best.refitted(fit, self.cuts, self.rig);
+            let next = best.refitted(fit, self.rig);
             let gain = best.score - next.score;
             if gain > 0.0 {
                 best = next;

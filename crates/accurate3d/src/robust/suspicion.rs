@@ -32,13 +32,9 @@ const DISTANCE_PX: f64 = 0.6;
 const COVERAGE: f64 = 0.97;
 
 /// The reasons to doubt a final choice, in the order of [`Suspicion`].
-pub(crate) fn suspicions(
-    chosen: &Candidate,
-    unexplained: f64,
-    margin: f64,
-    coverage: [f64; 2],
-) -> Vec<Suspicion> {
+pub(crate) fn suspicions(chosen: &Candidate, margin: f64, coverage: [f64; 2]) -> Vec<Suspicion> {
     let judgement = &chosen.fit.judgement;
+    let unexplained = chosen.misfit - judgement.outside;
     [
         (unexplained > UNEXPLAINED, Suspicion::UnexplainedOutline),
         (judgement.outside > OUTSIDE, Suspicion::OutsideMask),
