@@ -1,5 +1,5 @@
 //! How well `accurate` does on generated masks, case by case, beside a fit that starts from the truth:
-//! `cargo run -p accurate3d --example joint_study -- hard 1000 24 [--discs 1] [--turn 0.05] [--shift 0.3]`.
+//! `cargo run -p accurate3d --example joint_study -- hard 1000 24 [--discs 1] [--turn 0.05] [--shift 0.3] [--nuisance]`.
 //!
 //! Every line shows what the method says about itself (un, off, chi per point, margin, mean epipolar
 //! distance) and what the truth says (Hausdorff in px, Overall and Max of the table in world units).
@@ -12,7 +12,9 @@ use std::str::FromStr;
 use std::time::Instant;
 
 use accurate3d::eval::{curve_scores, table_scores};
-use accurate3d::fit::{Outline, OutlineFitParams, OutlinePair, fit_outlines, judge_curve};
+use accurate3d::fit::{
+    CalibrationPriors, Outline, OutlineFitParams, OutlinePair, fit_outlines, judge_curve,
+};
 use accurate3d::geom::{Curve3, Point3, Rig, View1, View2};
 use accurate3d::synth::{CalibrationError, CaseOptions, Family, generate};
 use accurate3d::{InputKind, Method, Params, ViewPair, reconstruct};
@@ -47,9 +49,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         }),
         ..CaseOptions::default()
     };
+    let nuisance = has(&args, "--nuisance");
     let lines: Vec<Line> = (from..from + cases)
         .into_par_iter()
-        .map(|index| study(family, seed, index, &options).map_err(|e| format!("{index}: {e}")))
+        .map(|index| {
+            study(family, seed, index, &options, nuisance).map_err(|e| format!("{index}: {e}"))
+        })
         .collect::<Result<_, _>>()?;
     if !quiet {
         lines.iter().for_each(|line| println!("{}", line.text));
@@ -72,13 +77,16 @@ fn study(
     seed: u64,
     index: u64,
     options: &CaseOptions,
+    nuisance: bool,
 ) -> Result<Line, Box<dyn Error + Send + Sync>> {
     let case = generate(family, seed, index, options)?;
     let (rig, truth) = (case.rig.clone(), case.truth.clone());
     let [mask1, mask2] = case.masks.clone();
     let pair = ViewPair::from(case);
     let clock = Instant::now();
-    let found = reconstruct(&pair, &Params::new(InputKind::Mask, Method::Accurate))?;
+    let mut params = Params::new(InputKind::Mask, Method::Accurate);
+    params.robust.calibration = nuisance.then_some(CalibrationPriors::DEFAULT);
+    let found = reconstruct(&pair, &params)?;
     let seconds = clock.elapsed().as_secs_f64();
 
     let curve = found.positions();

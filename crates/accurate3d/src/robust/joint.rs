@@ -1,10 +1,14 @@
-use accurate_fit::{AdaptiveParams, OutlineFit, OutlinePair, fit_outlines_adaptively};
+use accurate_fit::{
+    AdaptiveParams, CalibrationEstimate, CalibrationPriors, OutlineFit, OutlinePair,
+    fit_outlines_adaptively, fit_outlines_and_calibration,
+};
 use accurate_geom::{Pixel, Rig, View1, View2};
 use accurate_match::ProposeParams;
 use accurate_traverse::WalkParams;
 use ndarray::Array2;
 
 use super::candidates::ViewCandidates;
+use super::score::Candidate;
 use super::search::Search;
 use super::suspicion::{Suspicion, suspicions};
 use crate::Error;
@@ -37,6 +41,9 @@ pub struct RobustParams {
     pub good_distance_px: f64,
     /// Weight of the walks' own cost in the final choice.
     pub walk_weight: f64,
+    /// How wrong the calibration of view 2 may be; `None`: it is exact. Else a shift of image 2 and a
+    /// roll of its camera are unknowns, and the search is repeated with the rig so corrected.
+    pub calibration: Option<CalibrationPriors>,
 }
 
 impl RobustParams {
@@ -54,6 +61,7 @@ impl RobustParams {
         good_chi_per_point: 0.062,
         good_distance_px: 1.0,
         walk_weight: 0.3,
+        calibration: None,
     };
 }
 
@@ -69,8 +77,10 @@ pub(crate) struct JointResult {
     /// none.
     pub(crate) margin: f64,
     pub(crate) fits: usize,
-    /// Reasons to doubt the result; none for most right ones.
+    /// What the curve says about the calibration of view 2, if asked.
     #[allow(dead_code, reason = "for the diagnostics")]
+    pub(crate) calibration: Option<CalibrationEstimate>,
+    /// Reasons to doubt the result; none for most right ones.
     pub(crate) suspicions: Vec<Suspicion>,
 }
 
@@ -92,21 +102,77 @@ pub(crate) fn reconstruct_masks(
     let (outline1, outline2) = (view1.outline.clone(), view2.outline.clone());
     let outlines = OutlinePair::new(&outline1, &outline2)
         .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));
-    let search = Search { outlines: &outlines, rig, params, case };
+    let mut choice = choose(&mut view1, &mut view2, &outlines, rig, params, case)?;
+    let mut calibration = None;
+    if let Some(priors) = &params.calibration {
+        let calibrated = |best: &Candidate| {
+            let (start, settings) = (&best.fit.curve, &best.settings);
+            let adaptive = AdaptiveParams::DEFAULT;
+            fit_outlines_and_calibration(start, &outlines, rig, settings, &adaptive, priors).ok()
+        };
+        let corrected =
+            calibrated(&choice.best).and_then(|first| first.calibration.correct(rig).ok());
+        if let Some(corrected) = corrected {
+            choice = choose(&mut view1, &mut view2, &outlines, &corrected, params, case)?;
+        }
+        if let Some(last) = calibrated(&choice.best) {
+            choice.best = choice.best.refitted(last.fit, rig);
+            calibration = Some(last.calibration);
+        }
+    } else {
+        let adaptive = AdaptiveParams::DEFAULT;
+        let best = &choice.best;
+        let fit =
+            fit_outlines_adaptively(&best.fit.curve, &outlines, rig, &best.settings, &adaptive);
+        if let Ok(fit) = fit {
+            choice.best = best.refitted(fit, rig);
+        }
+    }
+    let Choice { best, margin, fits } = choice;
+    let [i, j] = best.walks;
+    let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
+    let suspicions = suspicions(&best, margin, coverage, rig);
+    Ok(JointResult {
+        walk1: view1.walks[i].points.clone(),
+        walk2: directed(&view2.walks[j].points, best.reversed),
+        coverage,
+        mean_distance_px: best.mean_distance_px,
+        margin,
+        fits,
+        calibration,
+        suspicions,
+        fit: best.fit,
+    })
+}
 
+struct Choice {
+    best: Candidate,
+    margin: f64,
+    fits: usize,
+}
+
+/// The search with one rig.
+fn choose(
+    view1: &mut ViewCandidates<View1>,
+    view2: &mut ViewCandidates<View2>,
+    outlines: &OutlinePair<'_>,
+    rig: &Rig,
+    params: &RobustParams,
+    case: &str,
+) -> Result<Choice, Error> {
+    let search = Search { outlines, rig, params, case };
     let mut found = Vec::new();
-    let pairs = search.propose_and_fit(&view1, &view2, [0, 0], params.max_fits, &mut found)?;
+    let pairs = search.propose_and_fit(view1, view2, [0, 0], params.max_fits, &mut found)?;
     let mut fits = found.len();
     let mut finalists = search.finalists(found);
-    let mut more = search.from_other_starts(&finalists, &view1, &view2);
+    let mut more = search.restarted(&finalists, view1, view2);
     more.append(&mut finalists);
     finalists = search.finalists(more);
-    let is_good =
-        |list: &[super::score::Candidate]| list.first().is_some_and(|best| best.is_good(params));
+    let is_good = |list: &[Candidate]| list.first().is_some_and(|best| best.is_good(params));
     if !is_good(&finalists) {
         if let Some(best) = finalists.first().cloned() {
             let mut more = Vec::new();
-            search.rewarded(&best, &mut view1, &mut view2, params.max_fits / 3, &mut more)?;
+            search.rewarded(&best, view1, view2, params.max_fits / 3, &mut more)?;
             fits += more.len();
             more.append(&mut finalists);
             finalists = search.finalists(more);
@@ -121,38 +187,15 @@ pub(crate) fn reconstruct_masks(
             finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
         }
     }
-    let Some(best) = finalists.first() else {
-        return Err(Error::NoCandidate {
-            case: case.to_owned(),
-            walks: [view1.walks.len(), view2.walks.len()],
-            pairs,
-        });
+    let Some(best) = finalists.first().cloned() else {
+        let walks = [view1.walks.len(), view2.walks.len()];
+        return Err(Error::NoCandidate { case: case.to_owned(), walks, pairs });
     };
     let margin = finalists
         .iter()
         .find(|rival| !rival.shape.is_like(&best.shape, RIVAL_PX))
         .map_or(f64::INFINITY, |rival| rival.score - best.score);
-    let chosen = fit_outlines_adaptively(
-        &best.fit.curve,
-        &outlines,
-        rig,
-        &best.settings,
-        &AdaptiveParams::DEFAULT,
-    )
-    .map_or_else(|_| best.clone(), |fit| best.refitted(fit, rig));
-    let [i, j] = chosen.walks;
-    let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
-    let suspicions = suspicions(&chosen, margin, coverage);
-    Ok(JointResult {
-        walk1: view1.walks[i].points.clone(),
-        walk2: directed(&view2.walks[j].points, chosen.reversed),
-        coverage,
-        mean_distance_px: chosen.mean_distance_px,
-        margin,
-        fits,
-        suspicions,
-        fit: chosen.fit,
-    })
+    Ok(Choice { best, margin, fits })
 }
 
 /// The bridges twice as wide as they come: what hides the body hides how it bends there.

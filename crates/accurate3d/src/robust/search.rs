@@ -127,9 +127,9 @@ impl Search<'_> {
         Some(finer)
     }
 
-    /// The first walk pairs again, matched from corner to corner with no free ends: some stretches along epipolar
-    /// lines come out otherwise.
-    pub(crate) fn from_other_starts(
+    /// The first walk pairs again, matched from corner to corner: some stretches along epipolar lines
+    /// come out otherwise.
+    pub(crate) fn restarted(
         &self,
         finalists: &[Candidate],
         view1: &ViewCandidates<View1>,
@@ -167,6 +167,9 @@ impl Search<'_> {
         const REST: f64 = 0.3;
         let mut best = candidate.clone();
         for _ in 0..ROUNDS {
+            if best.fit.converged {
+                break;
+            }
             let Some(fit) = self.fit(&best.fit.curve, &best.settings) else { break };
             let next = best.refitted(fit, self.rig);
             let gain = best.score - next.score;
@@ -180,8 +183,10 @@ impl Search<'_> {
         best
     }
 
-    /// The best different curves, converged, best first.
+    /// The best different curves, converged, best first. Beside a good one, those far behind are
+    /// not carried on.
     pub(crate) fn finalists(&self, mut found: Vec<Candidate>) -> Vec<Candidate> {
+        const BEHIND: f64 = 10.0;
         let different = |mut list: Vec<Candidate>| {
             list.sort_by(|a, b| a.score.total_cmp(&b.score));
             let mut kept: Vec<Candidate> = Vec::new();
@@ -194,6 +199,9 @@ impl Search<'_> {
         };
         found = different(found);
         found.truncate(self.params.finalists);
+        if let Some(best) = found.first().filter(|best| best.good).map(|best| best.score) {
+            found.retain(|candidate| candidate.score < best + BEHIND);
+        }
         different(found.iter().map(|candidate| self.converged(candidate)).collect())
     }
 }
