@@ -1,5 +1,7 @@
-//! From unordered skeleton pixels of two views to two ordered curves, as published (GCTT).
+//! From unordered skeleton pixels to ordered curves: the published traversal, and a graph that
+//! proposes every plausible order.
 //!
+//! # As published (GCTT)
 //! [`trace_pair`] picks the pair of endpoints that the epipolar geometry prefers and walks along
 //! each skeleton from there; [`trace_single`] and [`trace_from`] do it for one view. A [`Trace`]
 //! says what it left out and where it jumped.
@@ -18,9 +20,19 @@
 //! # Ok::<(), accurate_traverse::TraverseError>(())
 //! ```
 //!
+//! # Through crossings and overlaps
+//! A greedy walk loses its way where the body crosses itself. [`SkeletonGraph`] makes tips and
+//! junctions of a skeleton nodes and the stretches between them smooth edges, with links over gaps;
+//! [`k_best_walks`] proposes the cheapest [`Walk`]s along the whole body in one go, each with its
+//! price and the reason of every turn. Which proposal is true is for the two views together to say.
+//! [`k_best_walks_with_reward`] and [`fold_variants`] propose again where a proposal left something
+//! unexplained. [`smooth_centreline`], [`recentre`] and [`extend_to_body_ends`] make sub-pixel curves
+//! of pixels.
+//!
 //! # Source
-//! ACCURATE, section 2.2 (Geometry-consistent Curve Topology Traversal).
+//! ACCURATE, section 2.2 (Geometry-consistent Curve Topology Traversal); the rest is ours.
 
+mod body_end;
 mod curvature;
 mod error;
 mod gctt;
@@ -28,6 +40,7 @@ mod graph;
 mod pair;
 mod params;
 mod skeleton;
+mod subpixel;
 mod trace;
 mod walk;
 
@@ -37,8 +50,9 @@ pub use graph::{GraphEdge, GraphNode, GraphParams, NodeKind, SkeletonGraph, fill
 pub use pair::{StartPair, start_pair, trace_pair};
 pub use params::{Norm, TraverseParams};
 pub use skeleton::endpoints;
+pub use subpixel::{CentrelineParams, extend_to_body_ends, recentre, smooth_centreline};
 pub use trace::{Jump, Trace};
 pub use walk::{
-    Decision, HalfEdge, PointFlags, Walk, WalkCost, WalkEnd, WalkParams, k_best_walks,
-    k_best_walks_with_reward,
+    Decision, Fold, FoldParams, HalfEdge, PointFlags, Walk, WalkCost, WalkEnd, WalkParams,
+    fold_variants, k_best_walks, k_best_walks_with_reward,
 };

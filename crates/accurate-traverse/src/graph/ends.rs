@@ -7,19 +7,10 @@ use ndarray::Array2;
 
 use super::GraphEdge;
 use super::rough::RoughGraph;
-
-/// The longest stretch put back, px. Thinning takes at most a few pixels more than half a thickness.
-const MAX_STRETCH_PX: f64 = 16.0;
+use crate::body_end::{MAX_STRETCH_PX, free_length};
 
 /// Part of a tip's edge that gives its direction, px.
 const TANGENT_PX: usize = 8;
-
-/// Nearest pixel of the mask: where the distance to the background is not 0.
-pub(super) fn inside(radii: &Array2<f64>, at: Point2) -> bool {
-    // Negative and huge values saturate and fall outside; so does -1 after rounding.
-    let (x, y) = (at.x.round(), at.y.round());
-    x >= 0.0 && y >= 0.0 && radii.get((y as usize, x as usize)).is_some_and(|&r| r > 0.0)
-}
 
 /// Draws every tip out along its tangent until it is half a thickness from where the mask ends.
 pub(super) fn extend_tips(graph: &mut RoughGraph, radii: &Array2<f64>, mask_thickness_px: f64) {
@@ -38,11 +29,7 @@ pub(super) fn extend_tips(graph: &mut RoughGraph, radii: &Array2<f64>, mask_thic
             let (tip, radius) = (edge.points[last], edge.radii[last]);
             let ahead = tip - edge.points[last.saturating_sub(TANGENT_PX)];
             if let Some(ahead) = ahead.try_normalize(0.0) {
-                let mut free = 0.0;
-                while free < MAX_STRETCH_PX && inside(radii, tip + ahead * (free + 0.25)) {
-                    free += 0.25;
-                }
-                let stretch = free - mask_thickness_px / 2.0;
+                let stretch = free_length(radii, tip, ahead) - mask_thickness_px / 2.0;
                 if stretch > 0.0 {
                     let steps = stretch.ceil() as usize;
                     for k in 1..=steps {

@@ -74,7 +74,7 @@ fn tips<V: View>(nodes: &[GraphNode<V>], edges: &[GraphEdge<V>]) -> Vec<Tip> {
             if nodes[node].is_tip() {
                 let at = nodes[node].at.point();
                 // Over 10 px: skeletons bend towards corners of the mask in the last few.
-                let ahead = (at - edge.from_end(side, 10)).try_normalize(0.0).unwrap_or_default();
+                let ahead = (at - edge.near_end(side, 10)).try_normalize(0.0).unwrap_or_default();
                 tips.push(Tip { node, edge: index, side, at, ahead });
             }
         }

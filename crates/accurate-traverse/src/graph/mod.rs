@@ -160,7 +160,7 @@ impl<V: View> SkeletonGraph<V> {
         ends::stretch(&mut edges, &tips, radii, mask_thickness_px);
         for (edge, tips) in edges.iter().zip(&tips) {
             for side in (0..2).filter(|&side| tips[side]) {
-                nodes[edge.ends[side]].at = edge.from_end(side, 0).into();
+                nodes[edge.ends[side]].at = edge.near_end(side, 0).into();
             }
         }
         steps::split(&mut nodes, &mut edges, radii, mask_thickness_px, params);
@@ -201,7 +201,7 @@ impl<V: View> GraphEdge<V> {
     }
 
     /// The point at index `k` from the end `side` (0: first, 1: last), or the farthest there is.
-    pub(crate) fn from_end(&self, side: usize, k: usize) -> Point2 {
+    pub(crate) fn near_end(&self, side: usize, k: usize) -> Point2 {
         let last = self.points.len() - 1;
         let k = k.min(last);
         self.points[if side == 0 { k } else { last - k }].point()

@@ -40,7 +40,7 @@ fn gaussian(points: &[Point2], sigma: f64) -> Vec<Point2> {
             points[k as usize].coords
         }
     };
-    (0..n as isize)
+    let mut smoothed: Vec<Point2> = (0..n as isize)
         .map(|i| {
             let mut sum = at(i) * kernel[0];
             for (k, weight) in kernel.iter().enumerate().skip(1) {
@@ -48,7 +48,11 @@ fn gaussian(points: &[Point2], sigma: f64) -> Vec<Point2> {
             }
             Point2::from(sum / total)
         })
-        .collect()
+        .collect();
+    // The reflection keeps the ends up to rounding; this keeps them.
+    smoothed[0] = points[0];
+    smoothed[n - 1] = points[n - 1];
+    smoothed
 }
 
 /// Radii of the chain at the points of the polyline, by the share of the length: the polyline is a

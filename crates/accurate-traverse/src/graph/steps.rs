@@ -1,15 +1,13 @@
 //! Places on an edge where the body becomes thinner: a strand that ran beside the other ends or
 //! turns there without a branch of the skeleton to show for it.
 
-use accurate_geom::{Point2, View};
+use accurate_geom::View;
 use nalgebra::Vector2;
 use ndarray::Array2;
 
-use super::ends::inside;
 use super::{GraphEdge, GraphNode, GraphParams, NodeKind, split_edge};
+use crate::body_end::free_up_to as rim;
 
-/// Step of the search for the rim of the mask, px.
-const RIM_STEP_PX: f64 = 0.25;
 /// Half of the window over which widths are averaged, samples of 1 px. A mask's pixels put an error
 /// of up to 0.7 px on a single width.
 const HALF_WINDOW: usize = 3;
@@ -81,12 +79,4 @@ fn widths<V: View>(edge: &GraphEdge<V>, radii: &Array2<f64>, most: f64) -> Vec<f
             window.iter().sum::<f64>() / window.len() as f64
         })
         .collect()
-}
-
-fn rim(radii: &Array2<f64>, at: Point2, way: Vector2<f64>, most: f64) -> f64 {
-    let mut distance = 0.0;
-    while distance < most && inside(radii, at + way * (distance + RIM_STEP_PX)) {
-        distance += RIM_STEP_PX;
-    }
-    distance
 }

@@ -2,6 +2,7 @@
 
 mod assemble;
 mod beam;
+mod folds;
 mod params;
 mod prices;
 mod turns;
@@ -10,6 +11,7 @@ use std::collections::BTreeSet;
 
 use accurate_geom::{Pixel, View};
 
+pub use folds::{Fold, FoldParams, fold_variants};
 pub use params::WalkParams;
 
 use crate::{SkeletonGraph, TraverseError};
@@ -29,9 +31,9 @@ pub struct HalfEdge {
 pub struct WalkCost {
     /// Bends at nodes.
     pub bending: f64,
-    /// Turns at tips.
+    /// Turning round: at tips, other nodes and in folds.
     pub u_turns: f64,
-    /// Starting and ending at other nodes than tips.
+    /// Starting and ending elsewhere than at tips.
     pub ends: f64,
     /// Body not walked along.
     pub uncovered: f64,
@@ -108,6 +110,8 @@ pub struct Walk<V: View> {
     pub ends: [WalkEnd; 2],
     /// One entry per node passed.
     pub decisions: Vec<Decision<V>>,
+    /// Folds added by [`fold_variants`]; a walk through the graph has none.
+    pub folds: Vec<Fold<V>>,
     /// Part of the body's length walked along, 0 to 1.
     pub coverage: f64,
 }
