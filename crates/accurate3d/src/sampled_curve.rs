@@ -1,6 +1,6 @@
 use accurate_fit::CurveCovariance;
 use accurate_geom::nalgebra::Matrix3;
-use accurate_geom::{Curve3, EpipolarAngle, Pixel, Rig, View1, View2};
+use accurate_geom::{Curve3, EpipolarAngle, Rig};
 use accurate_match::{CurvePoint, MatchError, TangencyParams, tangency_sines1, tangency_sines2};
 
 /// Distance of the points of a fitted curve in the image, px.
@@ -19,15 +19,16 @@ pub(crate) fn sampled(
     rig: &Rig,
 ) -> SampledCurve {
     let (from, to) = curve.domain();
-    let pixels: Vec<_> = (0..=64)
+    let coarse: Vec<_> = (0..=64)
         .filter_map(|k| rig.project(&curve.at(from + (to - from) * f64::from(k) / 64.0)).ok())
         .collect();
     // The spacing need not be exact, and these chords miss little of the length.
-    let length_px = |distance: fn(&[(Pixel<View1>, Pixel<View2>)]) -> f64| {
-        pixels.windows(2).map(distance).sum::<f64>()
-    };
-    let longest =
-        length_px(|w| w[0].0.distance(w[1].0)).max(length_px(|w| w[0].1.distance(w[1].1)));
+    let (mut length1, mut length2) = (0.0, 0.0);
+    for w in coarse.windows(2) {
+        length1 += w[0].0.distance(w[1].0);
+        length2 += w[0].1.distance(w[1].1);
+    }
+    let longest = f64::max(length1, length2);
     let count = (longest / OUTPUT_SPACING_PX).ceil().clamp(2.0, 65_536.0) as usize;
     let (mut points, mut covariances) = (Vec::with_capacity(count), Vec::new());
     for t in curve.uniform_parameters(count) {
