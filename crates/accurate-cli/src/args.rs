@@ -87,6 +87,10 @@ pub struct ReconstructArgs {
     /// Also write picture.svg.
     #[arg(long)]
     pub picture: bool,
+    /// Estimate a small shift and turn of camera 2 together with the curve (accurate mode on masks
+    /// only).
+    #[arg(long)]
+    pub refine_calibration: bool,
     /// Exit with code 4 if a result is suspect; it is written all the same.
     #[arg(long)]
     pub strict: bool,
@@ -227,6 +231,10 @@ pub struct TableArgs {
     /// Write the table here instead of to stdout.
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Estimate a small shift and turn of camera 2 together with the curve (accurate mode on masks
+    /// only).
+    #[arg(long)]
+    pub refine_calibration: bool,
     /// Instead of a table: measure every cell of this file and compare it with its accepted
     /// interval.
     #[arg(long, value_name = "CELLS.csv", exclusive = true)]

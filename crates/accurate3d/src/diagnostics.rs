@@ -1,5 +1,6 @@
 use std::ops::Range;
 
+use accurate_fit::CalibrationEstimate;
 use accurate_match::{CurveReconstruction, FreeMatch};
 use serde::Serialize;
 
@@ -32,8 +33,41 @@ pub struct Diagnostics {
     pub suspicions: Vec<Suspicion>,
     /// How well the curve explains both outlines, where it was fitted to them.
     pub outline: Option<OutlineDiagnostics>,
+    /// What the curve says about the calibration of view 2, if that was asked for.
+    pub calibration: Option<CalibrationDiagnostics>,
     /// Why ordered points were matched but not adjusted, if so.
     pub not_adjusted: Option<String>,
+}
+
+/// The calibration of view 2 as estimated with the curve; view 1 is taken as exact.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CalibrationDiagnostics {
+    /// Shift of the image of view 2 against its camera, `[x, y]`, px.
+    pub shift_px: [f64; 2],
+    /// Turn of camera 2 about its optical axis, rad.
+    pub roll_rad: f64,
+    /// Unit direction in image 2 in which the shift is seen best.
+    pub observed: [f64; 2],
+    /// Posterior standard deviation of the shift in that direction, px.
+    pub observed_sigma_px: f64,
+    /// Unit direction in which it is seen worst: along the epipolar lines, where a shift changes
+    /// depths only.
+    pub unobserved: [f64; 2],
+    /// Posterior standard deviation there, px: near the prior's if nothing was seen.
+    pub unobserved_sigma_px: f64,
+}
+
+impl From<&CalibrationEstimate> for CalibrationDiagnostics {
+    fn from(estimate: &CalibrationEstimate) -> Self {
+        Self {
+            shift_px: estimate.shift_px,
+            roll_rad: estimate.roll_rad,
+            observed: estimate.observed,
+            observed_sigma_px: estimate.observed_sigma_px,
+            unobserved: estimate.unobserved,
+            unobserved_sigma_px: estimate.unobserved_sigma_px,
+        }
+    }
 }
 
 /// How well a fitted curve explains the outlines of both masks.
@@ -71,6 +105,7 @@ impl Diagnostics {
                 margin: result.margin.is_finite().then_some(result.margin),
                 fits: result.fits,
             }),
+            calibration: result.calibration.as_ref().map(CalibrationDiagnostics::from),
             not_adjusted: None,
         }
     }
@@ -96,6 +131,7 @@ impl Diagnostics {
             along_epipolar_line: share(along_epipolar_line),
             suspicions: suspicions(matched.mean_epipolar_distance_px, 1.0, [1.0; 2]),
             outline: None,
+            calibration: None,
             not_adjusted,
         }
     }
@@ -129,6 +165,7 @@ impl Diagnostics {
             along_epipolar_line: share(along_epipolar_line),
             suspicions: suspicions(matched.mean_epipolar_distance_px(), 2.0, traces.coverage),
             outline: None,
+            calibration: None,
             not_adjusted: None,
         }
     }

@@ -31,7 +31,7 @@ mod robust;
 mod sampled_curve;
 pub mod table;
 
-pub use diagnostics::Diagnostics;
+pub use diagnostics::{CalibrationDiagnostics, Diagnostics, OutlineDiagnostics};
 pub use error::{Error, Stage};
 pub use method::{InputKind, Method, UnknownName};
 pub use pair::ViewPair;

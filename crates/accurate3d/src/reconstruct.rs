@@ -115,9 +115,16 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         .as_ref()
         .ok_or_else(|| Error::MissingInput { case: pair.id.clone(), input: params.input })?;
     let result = reconstruct_masks(masks, &pair.rig, &params.robust, &pair.id)?;
+    // The curve was fitted under the corrected camera, if one was asked for.
+    let rig = match &result.calibration {
+        Some(calibration) => &calibration
+            .correct(&pair.rig)
+            .map_err(|source| Error::Fitting { case: pair.id.clone(), source })?,
+        None => &pair.rig,
+    };
     let SampledCurve { points, covariances } =
-        sampled(&result.fit.curve, result.fit.covariance.as_ref(), &pair.rig);
-    let along_epipolar_line = along_epipolar_lines(&points, &pair.rig)
+        sampled(&result.fit.curve, result.fit.covariance.as_ref(), rig);
+    let along_epipolar_line = along_epipolar_lines(&points, rig)
         .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;
     let diagnostics = Diagnostics::of_joint(&result, &along_epipolar_line);
     Ok(Reconstruction {

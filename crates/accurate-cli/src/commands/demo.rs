@@ -21,8 +21,9 @@ pub fn run(args: &DemoArgs, console: &Console) -> Result<(), Failure> {
     write_pair(&dir, &contents_of(case, PointsKind::Exact, None))?;
     let parts = PairParts { points: true, masks: true, images: false, truth: Truth::Required };
     let pair = ViewPair::from(read_pair(&dir, parts)?);
-    let reconstruction = reconstruct(&pair, &Params::new(InputKind::Mask, Method::default()))?;
-    let result = result_json(&dir, parts, &pair, &reconstruction)?;
+    let params = Params::new(InputKind::Mask, Method::default());
+    let reconstruction = reconstruct(&pair, &params)?;
+    let result = result_json(&dir, parts, &pair, &params, &reconstruction)?;
     let formats = [CurveFormat::Ply, CurveFormat::Vtp];
     write_outputs(&args.out, &pair, &reconstruction, &result, &formats, true)?;
     if console.json {

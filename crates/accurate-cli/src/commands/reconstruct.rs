@@ -1,6 +1,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use accurate3d::fit::CalibrationPriors;
 use accurate3d::io::{PairParts, Truth, find_pairs, hash_pair, read_pair, write_curve, write_json};
 use accurate3d::{
     InputKind, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair, picture_svg, reconstruct,
@@ -117,8 +118,10 @@ fn one(dir: &Path, out: &Path, args: &ReconstructArgs) -> Result<Done, Failure> 
         truth: Truth::IfPresent,
     };
     let pair = ViewPair::from(read_pair(dir, parts)?);
-    let reconstruction = reconstruct(&pair, &Params::new(args.input, args.method))?;
-    let result = result_json(dir, parts, &pair, &reconstruction)?;
+    let mut params = Params::new(args.input, args.method);
+    params.robust.calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
+    let reconstruction = reconstruct(&pair, &params)?;
+    let result = result_json(dir, parts, &pair, &params, &reconstruction)?;
     write_outputs(out, &pair, &reconstruction, &result, &args.also, args.picture)?;
     let doubted = !reconstruction.diagnostics.suspicions.is_empty();
     Ok(Done {
@@ -155,13 +158,14 @@ pub fn result_json(
     dir: &Path,
     parts: PairParts,
     pair: &ViewPair,
+    params: &Params,
     reconstruction: &Reconstruction,
 ) -> Result<Value, Failure> {
     let scores = match &pair.truth {
         Some(truth) => table_scores(&reconstruction.positions(), truth)?,
         None => Value::Null,
     };
-    let parameters: Value = Params::new(reconstruction.input, reconstruction.method)
+    let parameters: Value = params
         .described()
         .into_iter()
         .map(|(stage, text)| (stage.to_owned(), Value::from(text)))

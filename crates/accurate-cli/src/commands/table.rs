@@ -1,5 +1,6 @@
 use std::path::Path;
 
+use accurate3d::fit::CalibrationPriors;
 use accurate3d::io::{PairParts, Truth, find_pairs, read_pair};
 use accurate3d::synth::Family;
 use accurate3d::table::{
@@ -32,8 +33,9 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
             "no row of the table has these methods and inputs",
         ));
     }
+    let calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
     let bar = console.progress(set.len(), "measuring");
-    let table = measure(&set, &rows, args.scores, &|| bar.inc(1))?;
+    let table = measure(&set, &rows, args.scores, calibration, &|| bar.inc(1))?;
     bar.finish_and_clear();
     let format = if console.json { Some(accurate3d::table::Format::Json) } else { args.format };
     let text = match format {

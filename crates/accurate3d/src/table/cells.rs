@@ -95,7 +95,7 @@ pub fn check_cells(cells: &[Cell], on_case: &(dyn Fn() + Sync)) -> Result<Vec<Ce
             cases: CASES,
             points: PointsProtocol::Rounded,
         };
-        tables.push((set, measure(&cases, &rows, ScoreKind::Table, on_case)?));
+        tables.push((set, measure(&cases, &rows, ScoreKind::Table, None, on_case)?));
     }
     cells.iter().map(|cell| check(cell, &tables)).collect()
 }

@@ -2,6 +2,7 @@ use accurate_eval::{
     CurveScores, DEFAULT_RESAMPLES, EvalError, Metric, TableScores, bootstrap_mean, curve_scores,
     fraction_below, quantile, table_scores,
 };
+use accurate_fit::CalibrationPriors;
 use accurate_geom::{LengthUnit, Point3, Rig};
 use accurate_synth::{CaseOptions, Family, generate};
 use rayon::prelude::*;
@@ -142,6 +143,7 @@ const SPACING_PX: f64 = 0.5;
 
 /// Measures every row on every case; the same numbers for any number of threads.
 ///
+/// With `calibration`, `accurate` mode on masks may correct view 2 by as much as these priors allow.
 /// `on_case` is called when a case is done.
 ///
 /// # Errors
@@ -151,14 +153,16 @@ pub fn measure(
     set: &CaseSet,
     rows: &[Row],
     kind: super::ScoreKind,
+    calibration: Option<CalibrationPriors>,
     on_case: &(dyn Fn() + Sync),
 ) -> Result<Table, Error> {
     let per_case: Vec<(LengthUnit, Vec<CaseScore>)> = (0..set.len())
         .into_par_iter()
         .map(|index| {
             let pair = set.case(index)?;
-            let scores =
-                runnable(rows).map(|(row, method)| score(&pair, row, method, kind)).collect();
+            let scores = runnable(rows)
+                .map(|(row, method)| score(&pair, row, method, kind, calibration))
+                .collect();
             on_case();
             Ok((pair.rig.unit(), scores))
         })
@@ -200,10 +204,17 @@ fn runnable(rows: &[Row]) -> impl Iterator<Item = (&Row, crate::Method)> {
     })
 }
 
-fn score(pair: &ViewPair, row: &Row, method: crate::Method, kind: super::ScoreKind) -> CaseScore {
+fn score(
+    pair: &ViewPair,
+    row: &Row,
+    method: crate::Method,
+    kind: super::ScoreKind,
+    calibration: Option<CalibrationPriors>,
+) -> CaseScore {
     let fail = |reason: String| (pair.id.clone(), reason);
     let truth = pair.truth.as_deref().ok_or_else(|| fail("the pair has no truth".to_owned()))?;
-    let params = Params::new(row.input, method);
+    let mut params = Params::new(row.input, method);
+    params.robust.calibration = calibration;
     let reconstruction = reconstruct(pair, &params).map_err(|e| fail(e.to_string()))?;
     let curve = reconstruction.positions();
     let scored = match kind {
