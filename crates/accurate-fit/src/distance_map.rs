@@ -97,11 +97,16 @@ impl DistanceMap {
         Self { x0, y0, width, height, nearest }
     }
 
+    /// The foreground pixel nearest to the pixel of the window nearest to `(x, y)`.
+    pub(crate) fn nearest(&self, x: f64, y: f64) -> [f64; 2] {
+        self.look_up(x, y, x.round(), y.round()).0
+    }
+
     /// The foreground pixel nearest to `(x, y)`; beyond 1 px perhaps one that is up to 0.1 px farther.
     ///
     /// Looked up at the nearest pixel of the window, and at the others around `(x, y)` if that gives
     /// more than a distance that is certainly right: on masks 1 px thick, half a pixel counts.
-    pub(crate) fn nearest(&self, x: f64, y: f64) -> [f64; 2] {
+    pub(crate) fn nearest_around(&self, x: f64, y: f64) -> [f64; 2] {
         /// The nearest pixel itself is never farther than half a diagonal.
         const CERTAIN_PX: f64 = std::f64::consts::FRAC_1_SQRT_2;
         let (mut best, mut least) = self.look_up(x, y, x.round(), y.round());

@@ -222,7 +222,9 @@ impl OutlineProblem<'_> {
         let spline = &e.state.spline;
         let chords = &e.chords[view];
         for (k, p) in chords.points.iter().enumerate() {
-            let Some((distance, target)) = self.outside(view, p) else { continue };
+            // The pull needs a direction, not the last tenth of a pixel: it acts beyond 1.2 px.
+            let seen = self.outlines[view].outside.nearest(p.x, p.y);
+            let Some((distance, target)) = self.outside_from(view, p, seen) else { continue };
             if distance <= OUTSIDE_PX[0] || distance > OUTSIDE_PX[1] {
                 continue;
             }
@@ -239,14 +241,24 @@ impl OutlineProblem<'_> {
     /// Distance and nearest allowed position of a curve sample that is not on the mask, on a bridge
     /// or outside the image.
     pub(crate) fn outside(&self, view: usize, p: &Vector2<f64>) -> Option<(f64, Vector2<f64>)> {
+        let seen = self.outlines[view].outside.nearest_around(p.x, p.y);
+        self.outside_from(view, p, seen)
+    }
+
+    /// The same, with the foreground pixel `seen` nearest to the sample.
+    fn outside_from(
+        &self,
+        view: usize,
+        p: &Vector2<f64>,
+        seen: [f64; 2],
+    ) -> Option<(f64, Vector2<f64>)> {
         let outline = self.outlines[view];
         let (width, height) = (f64::from(outline.size.width), f64::from(outline.size.height));
         // What the image does not show cannot be judged.
         if !(p.x > -0.5 && p.y > -0.5 && p.x < width - 0.5 && p.y < height - 0.5) {
             return None;
         }
-        let [x, y] = outline.outside.nearest(p.x, p.y);
-        let mut target = Vector2::new(x, y);
+        let mut target = Vector2::new(seen[0], seen[1]);
         let mut distance = (target - p).norm();
         for &[x0, y0, x1, y1] in self.bridges[view] {
             let (a, b) = (Vector2::new(x0, y0), Vector2::new(x1, y1));
