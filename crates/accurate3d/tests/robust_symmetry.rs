@@ -1,5 +1,5 @@
 //! The reconstruction from masks does not depend on how the images lie or which is called the first.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use accurate3d::eval::curve_scores;
 use accurate3d::geom::nalgebra::{Matrix3, Vector3};
@@ -64,11 +64,11 @@ fn curve(rig: &Rig, masks: [Array2<bool>; 2]) -> Vec<Point3> {
     reconstruct(&pair, &Params::new(InputKind::Mask, Method::Accurate)).unwrap().positions()
 }
 
-/// Median and largest difference over the cases, px at the truth's depth.
-fn differences(other: impl Fn(&Rig, &[Array2<bool>; 2]) -> Vec<Point3>) -> (f64, f64) {
-    let mut found = Vec::new();
+/// Every case's largest and mean distance between the two curves stays below the tolerance.
+fn assert_same(other: impl Fn(&Rig, &[Array2<bool>; 2]) -> Vec<Point3>) {
+    // With the two medium cases that differ most of the first 16.
     for (family, index) in
-        [(Family::Easy, 0), (Family::Easy, 1), (Family::Medium, 2), (Family::Medium, 4)]
+        [(Family::Easy, 0), (Family::Easy, 13), (Family::Medium, 4), (Family::Medium, 13)]
     {
         let case = generate(family, 1000, index, &CaseOptions::default()).unwrap();
         let depth: f64 = case.truth.iter().map(|p| case.rig.camera1().depth(p)).sum::<f64>()
@@ -77,53 +77,43 @@ fn differences(other: impl Fn(&Rig, &[Array2<bool>; 2]) -> Vec<Point3>) -> (f64,
         let here = curve(&case.rig, case.masks.clone());
         let there = other(&case.rig, &case.masks);
         let scores = curve_scores(&there, &here, 0.5 * unit_per_px).unwrap();
-        println!(
-            "{family} {index}: {:.4} mean {:.4}",
-            scores.hausdorff / unit_per_px,
-            scores.overall / unit_per_px
-        );
-        found.push(scores.hausdorff / unit_per_px);
+        let [largest, mean] = [scores.hausdorff, scores.overall].map(|d| d / unit_per_px);
+        assert!(largest < LARGEST_PX && mean < MEAN_PX, "{family} {index}: {largest} {mean}");
     }
-    found.sort_by(f64::total_cmp);
-    (found[found.len() / 2], found[found.len() - 1])
 }
 
-fn turned(turn: Turn) -> (f64, f64) {
-    differences(|rig, masks| {
+fn assert_same_turned(turn: Turn) {
+    assert_same(|rig, masks| {
         let cameras = [rig.camera1(), rig.camera2()].map(|camera| turn.camera(camera));
         let [one, two] = cameras;
         let rig = Rig::new(one, two, rig.unit()).unwrap();
         curve(&rig, [turn.mask(&masks[0]), turn.mask(&masks[1])])
-    })
+    });
 }
 
-/// Thinning, and with it the walks, differs by up to 1 px between the turns of an image; what the fit
-/// makes of them differs only by where its steps stop (0.01 px as a rule), more where the curve is
-/// weakly seen.
-const MEDIAN_PX: f64 = 0.05;
-const LARGEST_PX: f64 = 0.3;
+/// Thinning moves by up to 1 px with the turn of an image, so that other pairs of walks are fitted and
+/// another of several nearly equal fits is kept. Of 16 easy and 16 medium cases all agree within
+/// 0.51 px. Not promised for many self-crossings: of 16 hard cases 12 to 15 agree within 1 px, the
+/// others differ by up to tens of px, where several orders of the strands score almost the same.
+const LARGEST_PX: f64 = 1.0;
+const MEAN_PX: f64 = 0.1;
 
 #[test]
 fn mirrored_images_give_the_same_curve() {
-    let (median, largest) = turned(Turn::MirrorX);
-    assert!(median < MEDIAN_PX && largest < LARGEST_PX, "{median} {largest}");
+    assert_same_turned(Turn::MirrorX);
 }
 
 #[test]
 fn transposed_images_give_the_same_curve() {
-    let (median, largest) = turned(Turn::Transpose);
-    assert!(median < MEDIAN_PX && largest < LARGEST_PX, "{median} {largest}");
+    assert_same_turned(Turn::Transpose);
 }
 
 #[test]
 fn images_turned_by_90_degrees_give_the_same_curve() {
-    let (median, largest) = turned(Turn::Rotate90);
-    assert!(median < MEDIAN_PX && largest < LARGEST_PX, "{median} {largest}");
+    assert_same_turned(Turn::Rotate90);
 }
 
 #[test]
 fn swapped_views_give_the_same_curve() {
-    let (median, largest) =
-        differences(|rig, [one, two]| curve(&rig.swapped(), [two.clone(), one.clone()]));
-    assert!(median < MEDIAN_PX && largest < LARGEST_PX, "{median} {largest}");
+    assert_same(|rig, [one, two]| curve(&rig.swapped(), [two.clone(), one.clone()]));
 }
