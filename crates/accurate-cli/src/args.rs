@@ -5,6 +5,8 @@ use accurate3d::table::{Format, ScoreKind};
 use accurate3d::{InputKind, Method};
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 
+use crate::code::Code;
+
 const VERSION: &str =
     concat!(env!("CARGO_PKG_VERSION"), "\nResearch software: not for clinical use.");
 
@@ -30,6 +32,11 @@ pub struct Cli {
     #[arg(long, global = true)]
     pub json: bool,
 
+    /// TOML file with options of the commands; what stands on the command line wins over it.
+    // Read before the command line is parsed, see `config.rs`.
+    #[arg(long, global = true, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+
     /// Worker threads, at most 1024; 0 takes all cores. The results are the same for any number.
     #[arg(
         long,
@@ -47,6 +54,8 @@ Examples:
   accurate reconstruct case_017 --input mask -o out    one pair folder
   accurate eval out/curve.csv --truth case_017/annotations/guidewire_3D.ply
   accurate table                                       the paper's table, beside its figures
+  accurate reproduce table1 -o out/table1              the same with hashes, to be verified
+  accurate explain A021                                what an error means
 
 Exit codes: 0 done; 1 internal error; 2 wrong usage; 3 no reconstruction found;
 4 suspect result (--strict); 65 bad input; 66 input missing; 69 a needed part is not installed; 74 a file could not be read or written.";
@@ -65,6 +74,63 @@ pub enum Command {
     Trace(TraceArgs),
     /// Reconstruct and score a shipped pair, with a picture.
     Demo(DemoArgs),
+    /// Run a published experiment and record what it was run with, so that it can be verified.
+    Reproduce(ReproduceArgs),
+    /// Run a recorded experiment again and compare every file.
+    Verify(VerifyArgs),
+    /// Say what the code of an error means and what to do about it.
+    Explain(ExplainArgs),
+    /// Print the completion script of a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual as roff: `accurate man | man -l -`.
+    Man,
+    /// About the file that --config reads.
+    #[command(subcommand)]
+    Config(ConfigCommand),
+}
+
+#[derive(Debug, Subcommand)]
+pub enum ConfigCommand {
+    /// Print the JSON schema of the config file.
+    Schema,
+}
+
+#[derive(Debug, Args)]
+pub struct ExplainArgs {
+    /// A code such as A021; all of them without one.
+    pub code: Option<Code>,
+}
+
+/// A published experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Experiment {
+    /// Table 1: every method on the simulation's and the phantom's sets.
+    Table1,
+}
+
+#[derive(Debug, Args)]
+pub struct ReproduceArgs {
+    /// What to run.
+    #[arg(value_enum)]
+    pub experiment: Experiment,
+    /// Folder for the tables and manifest.json.
+    #[arg(short, long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Seeds of the generated sets.
+    #[arg(long, value_delimiter = ',', default_value = "1,2,3,4,5")]
+    pub seeds: Vec<u64>,
+    /// Cases per seed; the paper's simulation test split has 26.
+    #[arg(long, default_value_t = 26)]
+    pub cases: u64,
+}
+
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// Folder that `accurate reproduce` wrote.
+    pub dir: PathBuf,
 }
 
 #[derive(Debug, Args)]
@@ -225,7 +291,7 @@ pub struct TableArgs {
     /// both ways).
     #[arg(long, default_value_t)]
     pub scores: ScoreKind,
-    /// md, csv, tex or json (default: a table for the terminal).
+    /// md, csv, tex, html or json (default: a table for the terminal).
     #[arg(long)]
     pub format: Option<Format>,
     /// Write the table here instead of to stdout.

@@ -8,25 +8,26 @@ use accurate3d::seg::SegError;
 use accurate3d::synth::SynthError;
 use accurate3d::traverse::TraverseError;
 
+use crate::code::Code;
+
 /// What went wrong, what to do about it, and the exit code that says so to a script.
 #[derive(Debug)]
 pub struct Failure {
-    code: u8,
+    code: Code,
     message: String,
     hint: Option<String>,
 }
 
 impl Failure {
-    pub const INTERNAL: u8 = 1;
-    pub const USAGE: u8 = 2;
-    pub const NO_RECONSTRUCTION: u8 = 3;
-    pub const SUSPECT: u8 = 4;
-    pub const BAD_INPUT: u8 = 65;
-    pub const NO_INPUT: u8 = 66;
-    pub const UNAVAILABLE: u8 = 69;
-    pub const IO: u8 = 74;
+    pub const INTERNAL: Code = Code::Internal;
+    pub const USAGE: Code = Code::Usage;
+    pub const SUSPECT: Code = Code::Suspect;
+    pub const BAD_INPUT: Code = Code::BadInput;
+    pub const NO_INPUT: Code = Code::NoInput;
+    pub const UNAVAILABLE: Code = Code::Unavailable;
+    pub const IO: Code = Code::Io;
 
-    pub fn new(code: u8, message: impl Into<String>) -> Self {
+    pub fn new(code: Code, message: impl Into<String>) -> Self {
         Self { code, message: message.into(), hint: None }
     }
 
@@ -41,17 +42,37 @@ impl Failure {
     }
 
     pub fn exit_code(&self) -> ExitCode {
-        ExitCode::from(self.code)
+        ExitCode::from(self.code.exit())
+    }
+}
+
+impl Failure {
+    /// For a person. `error` in the colour of errors where the terminal shows colours.
+    pub fn styled(&self, colour: bool) -> String {
+        let (red, plain) = if colour { ("\x1b[1;31m", "\x1b[0m") } else { ("", "") };
+        let code = self.code;
+        let mut text = format!("{red}error[{code}]{plain}: {}", self.message);
+        if let Some(hint) = &self.hint {
+            text.push_str(&format!("\n  hint: {hint}"));
+        }
+        text.push_str(&format!("\n  more: accurate explain {code}"));
+        text
+    }
+
+    /// For a program: the same as one line of JSON.
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "error": self.message,
+            "code": self.code.name(),
+            "exit": self.code.exit(),
+            "hint": self.hint,
+        })
     }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "error: {}", self.message)?;
-        match &self.hint {
-            Some(hint) => write!(f, "\n  hint: {hint}"),
-            None => Ok(()),
-        }
+        f.write_str(&self.styled(false))
     }
 }
 
@@ -62,15 +83,25 @@ impl From<IoError> for Failure {
                 (Self::NO_INPUT, Some("a pair folder's layout is in docs/conventions.md"))
             }
             IoError::NoPair { .. } => {
-                (Self::NO_INPUT, Some("give a pair folder, or a folder of case_* pair folders"))
+                (Code::NoPair, Some("give a pair folder, or a folder of case_* pair folders"))
             }
             IoError::System { .. } => (Self::IO, None),
             IoError::Geometry { .. } => (
-                Self::BAD_INPUT,
+                Code::Calibration,
                 Some("K is 3x3 upper triangular; RT is 3x4 [R | t], world to camera"),
             ),
-            IoError::SizeMismatch { .. } => {
-                (Self::BAD_INPUT, Some("masks and images must have the size the cameras are for"))
+            IoError::SizeMismatch { .. } => (
+                Code::SizeMismatch,
+                Some("masks and images must have the size the cameras are for"),
+            ),
+            IoError::TooLarge { .. } => (Code::TooLarge, None),
+            IoError::NotText { .. }
+            | IoError::Shape { .. }
+            | IoError::NotANumber { .. }
+            | IoError::Malformed { .. } => (Code::Malformed, None),
+            IoError::NotFinite { .. } => (Code::NotFinite, None),
+            IoError::Unsupported { .. } | IoError::UnknownExtension { .. } => {
+                (Code::Unsupported, None)
             }
             _ => (Self::BAD_INPUT, None),
         };
@@ -89,12 +120,15 @@ impl From<Error> for Failure {
             Error::NoNetwork { .. } => Self::new(Self::UNAVAILABLE, message)
                 .with_hint("segment the images elsewhere and use --input mask"),
             Error::MissingInput { .. } => Self::new(Self::NO_INPUT, message),
-            Error::Segmentation { .. } => Self::new(Self::BAD_INPUT, message)
+            Error::Segmentation { .. } => Self::new(Code::BadMask, message)
                 .with_hint("look at the mask: the body should be non-zero and at least 2 px long"),
-            Error::Traversal { .. } => Self::new(Self::NO_RECONSTRUCTION, message)
+            Error::Traversal { .. } => Self::new(Code::NoOrder, message)
                 .with_hint("order the points yourself and use --input points"),
-            Error::Matching { .. } => Self::new(Self::NO_RECONSTRUCTION, message)
+            Error::Matching { .. } => Self::new(Code::NoMatch, message)
                 .with_hint("check that the calibration belongs to these views, in this order"),
+            Error::NoCandidate { .. } => Self::new(Code::NoMatch, message)
+                .with_hint("check that the calibration belongs to these views, in this order"),
+            Error::Fitting { .. } => Self::new(Code::NoFit, message),
             Error::Name(_) => Self::new(Self::BAD_INPUT, message),
             Error::Synthesis(_) => Self::new(Self::USAGE, message),
             _ => Self::new(Self::INTERNAL, message),
@@ -116,12 +150,12 @@ impl From<EvalError> for Failure {
 
 impl From<SegError> for Failure {
     fn from(error: SegError) -> Self {
-        Self::new(Self::BAD_INPUT, error.to_string())
+        Self::new(Code::BadMask, error.to_string())
     }
 }
 
 impl From<TraverseError> for Failure {
     fn from(error: TraverseError) -> Self {
-        Self::new(Self::NO_RECONSTRUCTION, error.to_string())
+        Self::new(Code::NoOrder, error.to_string())
     }
 }

@@ -1,25 +1,50 @@
 //! The command `accurate`: two calibrated views in, a 3D curve out.
 //!
-//! stdout is data, stderr is prose; every error ends in a hint where there is one.
+//! stdout is data, stderr is prose; every error has a code, ends in a hint where there is one, and is
+//! JSON with `--json`.
 
 // Printing is this binary's job; the libraries below it never do.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod args;
+mod code;
 mod commands;
+mod config;
 mod console;
 mod failure;
 mod text;
 
-use clap::Parser;
+use std::io::IsTerminal;
+use std::process::ExitCode;
 
-fn main() -> std::process::ExitCode {
-    let cli = args::Cli::parse();
-    match commands::run(&cli) {
-        Ok(()) => std::process::ExitCode::SUCCESS,
+use clap::{CommandFactory, FromArgMatches};
+
+use crate::args::Cli;
+use crate::failure::Failure;
+
+fn main() -> ExitCode {
+    let words: Vec<_> = std::env::args_os().collect();
+    // As asked for on the command line alone: an unreadable config file is reported in that form too.
+    let json = words.iter().any(|word| word == "--json");
+    match run(words) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) if json => {
+            eprintln!("{}", failure.json());
+            failure.exit_code()
+        }
         Err(failure) => {
-            eprintln!("{failure}");
+            let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+            eprintln!("{}", failure.styled(colour));
             failure.exit_code()
         }
     }
+}
+
+fn run(words: Vec<std::ffi::OsString>) -> Result<(), Failure> {
+    // What a config file says stands before what the user says, and the last word wins.
+    let command = Cli::command().args_override_self(true);
+    let words = config::expand(&command, words)?;
+    let matches = command.clone().get_matches_from(words);
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    commands::run(&cli, &config::effective(&command, &matches))
 }

@@ -207,9 +207,13 @@ fn trace_orders_a_mask() {
 
 #[test]
 fn tables_come_in_every_format() {
-    for (format, sign) in
-        [("md", "| ---"), ("csv", "set,cases"), ("tex", "\\toprule"), ("json", "{")]
-    {
+    for (format, sign) in [
+        ("md", "| ---"),
+        ("csv", "set,cases"),
+        ("tex", "\\toprule"),
+        ("html", "<table>"),
+        ("json", "{"),
+    ] {
         let text = stdout(
             accurate().args(["table", "--seeds", "1000", "--cases", "2", "--format", format]),
         );

@@ -16,6 +16,11 @@ pub fn hash_file(path: &Path) -> Result<String, IoError> {
     Ok(hasher.finalize().to_hex().to_string())
 }
 
+/// The BLAKE3 hash of bytes in memory, 64 hexadecimal digits.
+pub fn hash_bytes(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex().to_string()
+}
+
 /// The files that [`read_pair`](crate::read_pair) reads with the same `needs`, each with its hash,
 /// so that a result can say what it was made from. Paths are as found from `dir`.
 ///

@@ -42,7 +42,7 @@ pub use curve::{Column, CurveTable, read_curve, write_curve};
 pub use distortion::{read_distortion, undistort_points};
 pub use error::IoError;
 pub use find::find_pairs;
-pub use fingerprint::{hash_file, hash_pair};
+pub use fingerprint::{hash_bytes, hash_file, hash_pair};
 pub use image_file::{
     BitDepth, GreyImage, MAX_IMAGE_SIDE_PX, read_grey, read_image_size, read_mask, write_grey,
     write_mask, write_u8, write_u16,

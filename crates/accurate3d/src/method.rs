@@ -104,7 +104,7 @@ impl InputKind {
 
 /// A name that stands for nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown {what} `{name}`: expected one of {expected}")]
+#[error("unknown {what} `{name}`: {}expected one of {expected}", suggestion(name, expected))]
 pub struct UnknownName {
     /// What was named.
     pub what: &'static str,
@@ -112,6 +112,18 @@ pub struct UnknownName {
     pub name: String,
     /// The names there are.
     pub expected: String,
+}
+
+/// `did you mean ...?`, if one of the expected names is close.
+fn suggestion(name: &str, expected: &str) -> String {
+    /// Jaro-Winkler likeness from which a name counts as a typing error of another.
+    const CLOSE: f64 = 0.8;
+    let near = expected
+        .split(", ")
+        .map(|candidate| (strsim::jaro_winkler(candidate, name), candidate))
+        .filter(|(likeness, _)| *likeness >= CLOSE)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    near.map(|(_, candidate)| format!("did you mean `{candidate}`? ")).unwrap_or_default()
 }
 
 impl FromStr for Method {
@@ -148,5 +160,18 @@ impl fmt::Display for Method {
 impl fmt::Display for InputKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_typing_error_is_told_the_name_that_was_meant() {
+        let error = "hofmann".parse::<Method>().unwrap_err().to_string();
+        assert!(error.contains("did you mean `hoffmann`?"), "{error}");
+        let error = "xyz".parse::<Method>().unwrap_err().to_string();
+        assert!(!error.contains("did you mean"), "{error}");
     }
 }

@@ -1,27 +1,45 @@
 mod demo;
 mod eval;
+mod explain;
 mod reconstruct;
+mod reproduce;
+mod shell;
 mod synth;
 mod table;
 mod trace;
+mod verify;
 
 use crate::args::{Cli, Command};
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::text::write_text;
 
-/// Runs the command of a parsed command line.
-pub fn run(cli: &Cli) -> Result<(), Failure> {
+/// Runs the command of a parsed command line. `config` is the config file that gives the same run.
+pub fn run(cli: &Cli, config: &str) -> Result<(), Failure> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(cli.threads.into())
         .build_global()
         .map_err(|error| Failure::new(Failure::INTERNAL, error.to_string()))?;
     let console = Console::of(cli);
     match &cli.command {
-        Command::Reconstruct(args) => reconstruct::run(args, &console),
+        Command::Reconstruct(args) => {
+            let result = reconstruct::run(args, &console);
+            // No folder, no result: then there is nothing to repeat.
+            if args.out.is_dir() {
+                write_text(&args.out.join("config.toml"), config)?;
+            }
+            result
+        }
         Command::Synth(args) => synth::run(args, &console),
         Command::Eval(args) => eval::run(args, &console),
         Command::Table(args) => table::run(args, &console),
         Command::Trace(args) => trace::run(args, &console),
         Command::Demo(args) => demo::run(args, &console),
+        Command::Reproduce(args) => reproduce::run(args, &console),
+        Command::Verify(args) => verify::run(args, &console),
+        Command::Explain(args) => explain::run(args, &console),
+        Command::Completions { shell } => shell::completions(*shell, &console),
+        Command::Man => shell::manual(&console),
+        Command::Config(command) => shell::config(command, &console),
     }
 }

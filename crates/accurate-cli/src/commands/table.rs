@@ -12,6 +12,7 @@ use comfy_table::Table as TerminalTable;
 
 use super::synth::case_options;
 use crate::args::{PointsKind, TableArgs};
+use crate::code::Code;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::text::{read_text, write_text};
@@ -137,7 +138,7 @@ fn check(path: &Path, console: &Console) -> Result<(), Failure> {
     console.remark(&format!("{} cells: {ran} measured, {failed} outside", checks.len()));
     match (ran, failed) {
         (_, 1..) => Err(Failure::new(
-            Failure::INTERNAL,
+            Code::CellsOutside,
             format!("{failed} cells lie outside their accepted intervals"),
         )),
         (0, _) => Err(Failure::new(Failure::BAD_INPUT, "no cell could be measured")),

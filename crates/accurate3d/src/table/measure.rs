@@ -66,6 +66,19 @@ impl CaseSet {
         self.len() == 0
     }
 
+    /// BLAKE3 hash of every case's cameras, points, masks, images and truth, so that two machines can
+    /// tell whether they measured the same data.
+    ///
+    /// # Errors
+    /// [`Error::Synthesis`] if a case cannot be generated.
+    pub fn fingerprint(&self) -> Result<String, Error> {
+        let cases: Vec<String> = (0..self.len())
+            .into_par_iter()
+            .map(|index| Ok(accurate_io::hash_bytes(&bytes_of(&self.case(index)?))))
+            .collect::<Result<_, Error>>()?;
+        Ok(accurate_io::hash_bytes(cases.concat().as_bytes()))
+    }
+
     fn case(&self, index: usize) -> Result<ViewPair, Error> {
         match self {
             Self::Generated { family, options, seeds, cases, points } => {
@@ -81,6 +94,23 @@ impl CaseSet {
             Self::Given { pairs, .. } => Ok(pairs[index].clone()),
         }
     }
+}
+
+/// All numbers of a pair in a fixed order, little-endian.
+fn bytes_of(pair: &ViewPair) -> Vec<u8> {
+    let mut bytes = pair.id.clone().into_bytes();
+    let mut push = |value: f64| bytes.extend(value.to_le_bytes());
+    for camera in [pair.rig.camera1(), pair.rig.camera2()] {
+        camera.k().iter().chain(camera.r().iter()).chain(camera.t().iter()).for_each(|v| push(*v));
+    }
+    if let Some(points) = &pair.points {
+        points.0.iter().flat_map(|p| [p.x, p.y]).for_each(&mut push);
+        points.1.iter().flat_map(|p| [p.x, p.y]).for_each(&mut push);
+    }
+    pair.truth.iter().flatten().flat_map(|p| p.iter()).for_each(|v| push(*v));
+    pair.images.iter().flatten().flatten().for_each(|v| push(f64::from(*v)));
+    bytes.extend(pair.masks.iter().flatten().flatten().map(|on| u8::from(*on)));
+    bytes
 }
 
 /// The scores of one case, of the kind the table shows.

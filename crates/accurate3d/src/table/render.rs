@@ -17,36 +17,43 @@ pub enum Format {
     Csv,
     /// LaTeX with booktabs.
     Tex,
+    /// A page of its own, for a browser.
+    Html,
     /// JSON.
     Json,
+}
+
+impl Format {
+    /// Every format.
+    pub const ALL: [Self; 5] = [Self::Md, Self::Csv, Self::Tex, Self::Html, Self::Json];
+
+    /// The name on the command line, and the extension of a file.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Md => "md",
+            Self::Csv => "csv",
+            Self::Tex => "tex",
+            Self::Html => "html",
+            Self::Json => "json",
+        }
+    }
 }
 
 impl FromStr for Format {
     type Err = UnknownName;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        match name {
-            "md" => Ok(Self::Md),
-            "csv" => Ok(Self::Csv),
-            "tex" => Ok(Self::Tex),
-            "json" => Ok(Self::Json),
-            _ => Err(UnknownName {
-                what: "format",
-                name: name.to_owned(),
-                expected: "md, csv, tex, json".to_owned(),
-            }),
-        }
+        Self::ALL.into_iter().find(|f| f.name() == name).ok_or_else(|| UnknownName {
+            what: "format",
+            name: name.to_owned(),
+            expected: Self::ALL.map(Self::name).join(", "),
+        })
     }
 }
 
 impl fmt::Display for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Md => "md",
-            Self::Csv => "csv",
-            Self::Tex => "tex",
-            Self::Json => "json",
-        })
+        f.pad(self.name())
     }
 }
 
@@ -56,6 +63,7 @@ pub fn render(table: &Table, format: Format) -> String {
         Format::Md => markdown(table),
         Format::Csv => csv(table),
         Format::Tex => latex(table),
+        Format::Html => html(table),
         Format::Json => format!("{:#}\n", to_json(table)),
     }
 }
@@ -233,6 +241,41 @@ fn latex(table: &Table) -> String {
     }
     text.push_str("\\bottomrule\n\\end{tabular}\n\\end{table}\n");
     text
+}
+
+/// A page without scripts or outside files; figures are right-aligned, the published ones grey.
+fn html(table: &Table) -> String {
+    let escape = |s: &str| s.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    let (header, rows) = grid(table);
+    let row = |cells: &[String], tag: &str| {
+        let cells: String = cells
+            .iter()
+            .zip(&header)
+            .map(|(cell, column)| {
+                let class = if column.ends_with("(paper)") { " class=\"paper\"" } else { "" };
+                format!("<{tag}{class}>{}</{tag}>", escape(cell))
+            })
+            .collect();
+        format!("<tr>{cells}</tr>\n")
+    };
+    let body: String = rows.iter().map(|cells| row(cells, "td")).collect();
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
+         <style>\n\
+         body {{ font: 15px/1.5 system-ui, sans-serif; margin: 2rem; color: #1a1a1a; background: #fff }}\n\
+         table {{ border-collapse: collapse; font-variant-numeric: tabular-nums }}\n\
+         caption {{ caption-side: bottom; text-align: left; max-width: 60rem; padding-top: .75rem; color: #555 }}\n\
+         th, td {{ padding: .3rem .8rem; text-align: right; border-bottom: 1px solid #ddd; white-space: nowrap }}\n\
+         th:nth-child(-n+3), td:nth-child(-n+3) {{ text-align: left }}\n\
+         thead th {{ border-bottom: 2px solid #333 }}\n\
+         .paper {{ color: #777 }}\n\
+         </style>\n<table>\n<caption>{caption} {note}</caption>\n\
+         <thead>\n{head}</thead>\n<tbody>\n{body}</tbody>\n</table>\n</html>\n",
+        title = escape(&format!("accurate: {}", table.set)),
+        caption = escape(&caption(table)),
+        note = crate::NOT_FOR_CLINICAL_USE,
+        head = row(&header, "th"),
+    )
 }
 
 fn to_json(table: &Table) -> Value {

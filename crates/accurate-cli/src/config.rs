@@ -1,0 +1,307 @@
+//! The config file: every option of every command, by its long name, under the command's name.
+//!
+//! Its keys, its schema and the effective config are read off the command line's own definition, so
+//! they cannot drift apart from it.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::parser::ValueSource;
+use clap::{Arg, ArgAction, ArgMatches, Command};
+use serde_json::{Map, Value, json};
+use toml::{Table, Value as Toml};
+
+use crate::code::Code;
+use crate::failure::Failure;
+use crate::text::read_text;
+
+/// Options that make no sense in a file.
+const NOT_IN_A_FILE: [&str; 4] = ["config", "help", "version", "json"];
+
+/// The words of the command line with those of its `--config` file put in, behind the command that
+/// they are for and before the user's own.
+///
+/// # Errors
+/// A file that cannot be read, is not TOML, or has a key that is no option.
+pub fn expand(command: &Command, mut words: Vec<OsString>) -> Result<Vec<OsString>, Failure> {
+    let Some(path) = config_path(&words) else { return Ok(words) };
+    let text = read_text(&path)?;
+    let wrong = |problem: String| {
+        Failure::new(Code::Malformed, format!("{}: {problem}", path.display()))
+            .with_hint("`accurate config schema` lists every key")
+    };
+    let mut table: Table = text.parse().map_err(|e: toml::de::Error| wrong(e.to_string()))?;
+    check(command, &table, "").map_err(wrong)?;
+    // The global options first, then the command's, then those of a command below it.
+    let (mut here, mut at, mut insert_at) = (command, 0, 1);
+    loop {
+        let new = words_of(here, &table).map_err(wrong)?;
+        let count = new.len();
+        words.splice(insert_at..insert_at, new);
+        at = at.max(insert_at - 1) + count;
+        let Some((position, below)) = next_command(here, &words, at + 1) else { break };
+        table = match table.remove(below.get_name()) {
+            Some(Toml::Table(inner)) => inner,
+            _ => Table::new(),
+        };
+        (here, at, insert_at) = (below, position, position + 1);
+    }
+    Ok(words)
+}
+
+/// The options in effect, as a config file that gives the same run.
+pub fn effective(command: &Command, matches: &ArgMatches) -> String {
+    fn table_of(command: &Command, matches: &ArgMatches) -> Table {
+        let mut table = Table::new();
+        for arg in options(command) {
+            let id = arg.get_id().as_str();
+            if matches.value_source(id).is_none() {
+                continue;
+            }
+            let flag = matches!(arg.get_action(), ArgAction::SetTrue);
+            let count = matches!(arg.get_action(), ArgAction::Count);
+            let value = if flag {
+                Toml::Boolean(matches.get_flag(id))
+            } else if count {
+                Toml::Integer(matches.get_count(id).into())
+            } else {
+                let words: Vec<String> = matches
+                    .get_raw(id)
+                    .into_iter()
+                    .flatten()
+                    .map(|raw| raw.to_string_lossy().into_owned())
+                    .collect();
+                match (words.as_slice(), is_list(arg)) {
+                    ([], _) => continue,
+                    ([one], false) => {
+                        one.parse::<i64>().map_or_else(|_| Toml::String(one.clone()), Toml::Integer)
+                    }
+                    _ => words.into(),
+                }
+            };
+            // A default that says "off" is what leaving it out says.
+            if matches.value_source(id) == Some(ValueSource::DefaultValue) && (flag || count) {
+                continue;
+            }
+            table.insert(name(arg), value);
+        }
+        if let Some((below, inner)) = matches.subcommand()
+            && let Some(below) = command.find_subcommand(below)
+        {
+            table.insert(below.get_name().to_owned(), Toml::Table(table_of(below, inner)));
+        }
+        table
+    }
+    toml::to_string(&table_of(command, matches)).unwrap_or_default()
+}
+
+/// The JSON schema of the config file.
+pub fn schema(command: &Command) -> Value {
+    fn object(command: &Command) -> Value {
+        let mut properties = Map::new();
+        for arg in options(command) {
+            let mut property = match arg.get_action() {
+                ArgAction::SetTrue => json!({"type": "boolean"}),
+                ArgAction::Count => json!({"type": "integer", "minimum": 0}),
+                _ => {
+                    let names: Vec<String> =
+                        arg.get_possible_values().iter().map(|v| v.get_name().to_owned()).collect();
+                    let one = if names.is_empty() {
+                        json!({"type": ["string", "number"]})
+                    } else {
+                        json!({"enum": names})
+                    };
+                    if is_list(arg) { json!({"type": "array", "items": one}) } else { one }
+                }
+            };
+            if let Some(help) = arg.get_help() {
+                property["description"] = Value::from(help.to_string());
+            }
+            properties.insert(name(arg), property);
+        }
+        for below in subcommands(command) {
+            let mut inner = object(below);
+            if let Some(about) = below.get_about() {
+                inner["description"] = Value::from(about.to_string());
+            }
+            properties.insert(below.get_name().to_owned(), inner);
+        }
+        json!({"type": "object", "properties": properties, "additionalProperties": false})
+    }
+    let mut schema = object(command);
+    schema["$schema"] = Value::from("https://json-schema.org/draft/2020-12/schema");
+    schema["title"] = Value::from("Config file of accurate");
+    schema
+}
+
+fn config_path(words: &[OsString]) -> Option<PathBuf> {
+    words.iter().enumerate().skip(1).find_map(|(at, word)| {
+        let word = word.to_str()?;
+        match word.strip_prefix("--config") {
+            Some("") => words.get(at + 1).map(PathBuf::from),
+            Some(rest) => rest.strip_prefix('=').map(PathBuf::from),
+            None => None,
+        }
+    })
+}
+
+/// The next word that names a command below `command`, from index `from` on.
+fn next_command<'a>(
+    command: &'a Command,
+    words: &[OsString],
+    from: usize,
+) -> Option<(usize, &'a Command)> {
+    let mut at = from;
+    while let Some(word) = words.get(at) {
+        let word = word.to_string_lossy();
+        if let Some(long) = word.strip_prefix("--") {
+            // Its value, if it takes one and has not got it with `=`, is no command.
+            let takes_value = options(command)
+                .chain(command.get_arguments())
+                .any(|a| a.get_long() == Some(long) && a.get_action().takes_values());
+            at += usize::from(takes_value);
+        } else if !word.starts_with('-') {
+            return command.find_subcommand(&*word).map(|below| (at, below));
+        }
+        at += 1;
+    }
+    None
+}
+
+/// Refuses the first key that is neither an option nor a command.
+fn check(command: &Command, table: &Table, path: &str) -> Result<(), String> {
+    for (key, value) in table {
+        if let (Some(below), Toml::Table(inner)) =
+            (subcommands(command).find(|c| c.get_name() == key), value)
+        {
+            check(below, inner, &format!("{path}{key}."))?;
+        } else if !options(command).any(|arg| name(arg) == *key) {
+            let names = options(command)
+                .map(name)
+                .chain(subcommands(command).map(|c| c.get_name().to_owned()));
+            let near = names
+                .map(|n| (strsim::jaro_winkler(&n, key), n))
+                .filter(|(likeness, _)| *likeness > 0.8)
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            let suggestion =
+                near.map(|(_, n)| format!("; did you mean `{n}`?")).unwrap_or_default();
+            return Err(format!("`{path}{key}` is no option{suggestion}"));
+        }
+    }
+    Ok(())
+}
+
+/// What a command's own keys say, as words of a command line.
+fn words_of(command: &Command, table: &Table) -> Result<Vec<OsString>, String> {
+    let mut words = Vec::new();
+    for arg in options(command) {
+        let key = name(arg);
+        let Some(value) = table.get(&key) else { continue };
+        match (arg.get_action(), value) {
+            (ArgAction::SetTrue, Toml::Boolean(on)) => {
+                words.extend(on.then(|| format!("--{key}").into()));
+            }
+            (ArgAction::SetTrue, _) => return Err(format!("`{key}` is true or false")),
+            (ArgAction::Count, Toml::Integer(n @ 0..=9)) => {
+                words.extend((0..*n).map(|_| OsString::from(format!("--{key}"))));
+            }
+            (ArgAction::Count, _) => return Err(format!("`{key}` is a whole number, 0 to 9")),
+            (_, Toml::Array(items)) if is_list(arg) => {
+                let items: Vec<String> =
+                    items.iter().map(|item| scalar(&key, item)).collect::<Result<_, _>>()?;
+                words.push(format!("--{key}={}", items.join(",")).into());
+            }
+            _ => words.push(format!("--{key}={}", scalar(&key, value)?).into()),
+        }
+    }
+    Ok(words)
+}
+
+fn scalar(key: &str, value: &Toml) -> Result<String, String> {
+    match value {
+        Toml::String(text) => Ok(text.clone()),
+        Toml::Integer(n) => Ok(n.to_string()),
+        Toml::Float(x) => Ok(x.to_string()),
+        other => Err(format!("`{key}` cannot be {}", other.type_str())),
+    }
+}
+
+fn options(command: &Command) -> impl Iterator<Item = &Arg> {
+    command
+        .get_arguments()
+        .filter(|arg| arg.get_long().is_some_and(|long| !NOT_IN_A_FILE.contains(&long)))
+}
+
+fn subcommands(command: &Command) -> impl Iterator<Item = &Command> {
+    command.get_subcommands().filter(|below| !below.is_hide_set() && below.get_name() != "help")
+}
+
+fn name(arg: &Arg) -> String {
+    arg.get_long().unwrap_or_default().to_owned()
+}
+
+fn is_list(arg: &Arg) -> bool {
+    arg.get_value_delimiter().is_some() || matches!(arg.get_action(), ArgAction::Append)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+    use crate::args::Cli;
+
+    fn expanded(config: &str, words: &[&str]) -> Result<Vec<String>, String> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("accurate.toml");
+        std::fs::write(&path, config).unwrap();
+        let mut all: Vec<OsString> = vec!["accurate".into(), "--config".into(), path.into()];
+        all.extend(words.iter().map(OsString::from));
+        expand(&Cli::command(), all)
+            .map(|words| {
+                let words = words.iter().map(|w| w.to_string_lossy().into_owned());
+                words.filter(|w| !w.contains("accurate")).collect()
+            })
+            .map_err(|failure| failure.to_string())
+    }
+
+    #[test]
+    fn the_users_words_come_after_those_of_the_file() {
+        let config = "threads = 2\n[reconstruct]\ninput = \"mask\"\nstrict = true\nalso = [\"ply\", \"npy\"]\n[table]\ncases = 3\n";
+        let words = expanded(config, &["reconstruct", "pair", "--input", "points"]).unwrap();
+        let at = |word: &str| words.iter().position(|w| w == word).unwrap();
+        assert!(at("--threads=2") < at("reconstruct"));
+        assert!(at("reconstruct") < at("--input=mask"));
+        assert!(at("--input=mask") < at("--input"));
+        assert!(at("--strict") < at("pair") && at("--also=ply,npy") < at("pair"));
+        assert!(!words.iter().any(|w| w.contains("cases")));
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_with_the_nearest_name() {
+        let error = expanded("[reconstruct]\nmethd = \"paper\"\n", &["demo"]).unwrap_err();
+        assert!(error.contains("reconstruct.methd"), "{error}");
+        assert!(error.contains("did you mean `method`"), "{error}");
+    }
+
+    #[test]
+    fn the_schema_knows_every_command_and_its_options() {
+        let schema = schema(&Cli::command());
+        let reconstruct = &schema["properties"]["reconstruct"]["properties"];
+        assert_eq!(reconstruct["strict"]["type"], "boolean");
+        assert_eq!(reconstruct["also"]["type"], "array");
+        assert!(schema["properties"]["threads"].is_object());
+    }
+
+    #[test]
+    fn the_effective_config_gives_the_same_run() {
+        let words = ["accurate", "--threads", "2", "table", "--cases", "3", "--seeds", "1,2"];
+        let command = Cli::command().args_override_self(true);
+        let matches = command.clone().try_get_matches_from(words).unwrap();
+        let config = effective(&command, &matches);
+        let again = expanded(&config, &["table"]).unwrap();
+        assert!(again.contains(&"--cases=3".to_owned()), "{again:?}");
+        assert!(again.contains(&"--seeds=1,2".to_owned()), "{again:?}");
+        assert!(again.contains(&"--threads=2".to_owned()), "{again:?}");
+    }
+}
