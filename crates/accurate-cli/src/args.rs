@@ -52,6 +52,7 @@ const EXAMPLES: &str = "\
 Examples:
   accurate demo                                        a shipped pair, reconstructed and scored
   accurate reconstruct case_017 --input mask -o out    one pair folder
+  accurate reconstruct case_017 -i mask -o wire.vtp -o wire.mrk.json -o report.html
   accurate eval out/curve.csv --truth case_017/annotations/guidewire_3D.ply
   accurate table                                       the paper's table, beside its figures
   accurate reproduce table1 -o out/table1              the same with hashes, to be verified
@@ -144,15 +145,20 @@ pub struct ReconstructArgs {
     /// accurate, paper, paper-refined, baert, baert-table, hoffmann, hoffmann-table or baur.
     #[arg(short, long, default_value_t)]
     pub method: Method,
-    /// Folder for curve.csv and result.json; with several pairs, one folder a case below it.
-    #[arg(short, long, value_name = "DIR")]
-    pub out: PathBuf,
-    /// Curve files to write besides curve.csv.
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "FORMATS")]
-    pub also: Vec<CurveFormat>,
+    /// Folder for curve.csv and result.json (with several pairs, one folder a case below it), or a
+    /// file whose extension says what it is to hold: .csv, .ply, .vtp, .mrk.json, .npy, .npz,
+    /// .parquet, .svg (picture), .html (report), .json (result). May be given several times.
+    #[arg(short, long, required = true, value_name = "DIR|FILE")]
+    pub out: Vec<PathBuf>,
+    /// Files to write into the folder besides curve.csv and result.json.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "KINDS")]
+    pub also: Vec<Extra>,
     /// Also write picture.svg.
     #[arg(long)]
     pub picture: bool,
+    /// Also write the report, one HTML page that needs no network; same as --out FILE.html.
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
     /// Estimate a small shift and turn of camera 2 together with the curve (accurate mode on masks
     /// only).
     #[arg(long)]
@@ -162,20 +168,34 @@ pub struct ReconstructArgs {
     pub strict: bool,
 }
 
-/// A curve file format.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum CurveFormat {
+/// A file that a result's folder may hold besides curve.csv and result.json.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Extra {
     Ply,
+    /// VTK PolyData, for ParaView.
     Vtp,
+    /// Markups of 3D Slicer.
+    MrkJson,
     Npy,
+    Npz,
+    Parquet,
+    /// picture.svg.
+    Picture,
+    /// report.html.
+    Report,
 }
 
-impl CurveFormat {
-    pub const fn extension(self) -> &'static str {
+impl Extra {
+    pub const fn file_name(self) -> &'static str {
         match self {
-            Self::Ply => "ply",
-            Self::Vtp => "vtp",
-            Self::Npy => "npy",
+            Self::Ply => "curve.ply",
+            Self::Vtp => "curve.vtp",
+            Self::MrkJson => "curve.mrk.json",
+            Self::Npy => "curve.npy",
+            Self::Npz => "curve.npz",
+            Self::Parquet => "curve.parquet",
+            Self::Picture => "picture.svg",
+            Self::Report => "report.html",
         }
     }
 }

@@ -32,9 +32,14 @@ pub fn expand(command: &Command, mut words: Vec<OsString>) -> Result<Vec<OsStrin
     };
     let mut table: Table = text.parse().map_err(|e: toml::de::Error| wrong(e.to_string()))?;
     check(command, &table, "").map_err(wrong)?;
+    let own: Vec<String> = words.iter().map(|w| w.to_string_lossy().into_owned()).collect();
     // The global options first, then the command's, then those of a command below it.
     let (mut here, mut at, mut insert_at) = (command, 0, 1);
     loop {
+        // Of an option that may be given several times, the user's own replace those of the file.
+        for arg in options(here).filter(|arg| is_list(arg) && is_given(arg, &own)) {
+            table.remove(&name(arg));
+        }
         let new = words_of(here, &table).map_err(wrong)?;
         let count = new.len();
         words.splice(insert_at..insert_at, new);
@@ -142,6 +147,17 @@ fn config_path(words: &[OsString]) -> Option<PathBuf> {
             Some(rest) => rest.strip_prefix('=').map(PathBuf::from),
             None => None,
         }
+    })
+}
+
+/// Whether the words of a command line give an option, by its long or its short name.
+fn is_given(arg: &Arg, words: &[String]) -> bool {
+    words.iter().any(|word| match word.strip_prefix("--") {
+        Some(long) => arg.get_long() == Some(long.split('=').next().unwrap_or(long)),
+        None => word
+            .strip_prefix('-')
+            .and_then(|s| s.chars().next())
+            .is_some_and(|short| arg.get_short() == Some(short)),
     })
 }
 

@@ -110,13 +110,13 @@ fn the_same_bytes_for_any_number_of_threads() {
 fn extra_formats_hold_the_same_curve() {
     let dir = TempDir::new().unwrap();
     accurate()
-        .args(["reconstruct", "--input", "points", "--also", "ply,vtp,npy", "--out"])
+        .args(["reconstruct", "--input", "points", "--also", "ply,vtp,npy,mrk-json", "--out"])
         .arg(dir.path())
         .arg(samples().join("bend"))
         .assert()
         .success();
     let curve = dir.path().join("curve.csv");
-    for extension in ["ply", "vtp", "npy"] {
+    for extension in ["ply", "vtp", "npy", "mrk.json"] {
         let text = stdout(
             accurate()
                 .arg("eval")
@@ -127,6 +127,50 @@ fn extra_formats_hold_the_same_curve() {
         let scores: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(scores["max_error"].as_f64().unwrap(), 0.0, "{extension}");
     }
+}
+
+#[test]
+fn results_go_to_the_files_that_are_named() {
+    let dir = TempDir::new().unwrap();
+    let file = |name: &str| dir.path().join("new/folder").join(name);
+    let mut command = accurate();
+    command.args(["reconstruct", "--input", "points", "--method", "paper"]);
+    command.arg(samples().join("bend"));
+    let names = ["w.vtp", "w.mrk.json", "w.npz", "w.parquet", "w.svg", "w.json"];
+    for name in names {
+        command.arg("-o").arg(file(name));
+    }
+    command.arg("--report").arg(file("w.html"));
+    stdout(&mut command);
+    for name in names.into_iter().chain(["w.html"]) {
+        assert!(file(name).metadata().unwrap().len() > 100, "{name}");
+    }
+    assert!(!file("curve.csv").exists(), "no folder was asked for");
+    let html = fs::read_to_string(file("w.html")).unwrap();
+    // Points were read; the masks beside them are shown all the same.
+    assert!(html.contains("\"kind\":\"mask\""));
+    assert!(html.contains("not for clinical use"));
+}
+
+#[test]
+fn outputs_that_cannot_be_are_refused_before_anything_runs() {
+    let dir = TempDir::new().unwrap();
+    let out = |name: &str| dir.path().join(name).display().to_string();
+    let (bend, wire) = (samples().join("bend"), samples().join("wire"));
+    let (bend, wire) = (bend.display().to_string(), wire.display().to_string());
+    for (words, expected) in [
+        (vec![&*bend, &*wire, "-o", &*out("one.vtp")], "2 pairs"),
+        (vec![&*bend, "-o", &*out("a"), "-o", &*out("b")], "both taken for folders"),
+        (vec![&*bend, "-o", &*out("a.vtp"), "--also", "ply"], "need a folder"),
+        (vec![&*bend, "-o", &*out("a"), "--report", &*out("a.pdf")], "a.pdf"),
+    ] {
+        let mut command = accurate();
+        command.args(["reconstruct", "--input", "points"]).args(&words);
+        let (code, message) = failure(&mut command);
+        assert_eq!(code, 2, "{words:?}: {message}");
+        assert!(message.contains(expected), "{words:?}: {message}");
+    }
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
 }
 
 #[test]
@@ -183,7 +227,15 @@ fn demo_writes_everything_and_scores_it() {
     let dir = TempDir::new().unwrap();
     let text = stdout(accurate().args(["demo", "--out"]).arg(dir.path()));
     assert!(text.contains("against the truth"), "{text}");
-    for file in ["curve.csv", "curve.ply", "curve.vtp", "result.json", "picture.svg"] {
+    for file in [
+        "curve.csv",
+        "curve.ply",
+        "curve.vtp",
+        "curve.mrk.json",
+        "result.json",
+        "picture.svg",
+        "report.html",
+    ] {
         assert!(dir.path().join(file).is_file(), "{file}");
     }
 }

@@ -5,10 +5,16 @@ use accurate_geom::{LengthUnit, Point3};
 
 use crate::IoError;
 use crate::matrix::finite;
-use crate::{curve_csv, npy, ply, vtp};
+use crate::{curve_csv, markups, npy, npz, ply, vtp};
 
-/// The extensions [`read_curve`] and [`write_curve`] know.
-const EXTENSIONS: &str = ".csv, .ply, .vtp, .npy";
+/// The extensions [`write_curve`] knows.
+#[cfg(feature = "parquet")]
+const WRITTEN: &str = ".csv, .ply, .vtp, .mrk.json, .npy, .npz, .parquet";
+#[cfg(not(feature = "parquet"))]
+const WRITTEN: &str = ".csv, .ply, .vtp, .mrk.json, .npy, .npz";
+
+/// The extensions [`read_curve`] knows.
+const READ: &str = ".csv, .ply, .vtp, .mrk.json, .npy";
 
 /// Most columns a curve may have. Names are compared with one another, so that a file of a million
 /// columns would take hours.
@@ -90,9 +96,13 @@ impl CurveTable {
 /// - `.csv`: header `x,y,z`, then one column per [`Column`] headed `name[unit]`;
 /// - `.ply`: binary little-endian doubles, columns as further properties, units as comments;
 /// - `.vtp`: VTK PolyData (ASCII XML), one polyline, columns as point arrays, units as field data;
-/// - `.npy`: N x 3 doubles; **columns and unit are not stored**.
+/// - `.mrk.json`: a 3D Slicer Markups curve, LPS, columns as measurements per control point; Slicer's
+///   points are millimetres, so cm and m are scaled, and `unit` is shown as if it were mm;
+/// - `.npy`: N x 3 doubles; **columns and unit are not stored**;
+/// - `.npz`: `points` (N x 3), one array per column, `units_json` (UTF-8 bytes of a JSON object);
+/// - `.parquet` (feature `parquet`): one double column each, units as key-value metadata.
 ///
-/// Numbers keep every bit.
+/// Numbers keep every bit (scaled ones aside).
 ///
 /// # Errors
 /// [`IoError::Empty`], [`IoError::NotFinite`] naming point and column, [`IoError::Field`] for a
@@ -104,8 +114,12 @@ pub fn write_curve(path: &Path, curve: &CurveTable) -> Result<(), IoError> {
         "csv" => curve_csv::write(path, curve),
         "ply" => ply::write(path, curve, ply::PlyEncoding::BinaryLittleEndian),
         "vtp" => vtp::write(path, curve),
+        "mrk.json" => markups::write(path, curve),
         "npy" => npy::write(path, curve),
-        _ => Err(unknown_extension(path)),
+        "npz" => npz::write(path, curve),
+        #[cfg(feature = "parquet")]
+        "parquet" => crate::parquet_file::write(path, curve),
+        _ => Err(unknown_extension(path, WRITTEN)),
     }
 }
 
@@ -114,7 +128,10 @@ pub fn write_curve(path: &Path, curve: &CurveTable) -> Result<(), IoError> {
 /// - `.csv` with columns `x`, `y`, `z` anywhere in its header and numbers in all others;
 /// - `.ply` ASCII or binary, float or double;
 /// - `.npy` N x 3 of `f8` or `f4`;
-/// - `.vtp` with ASCII arrays and one polyline through all points in order.
+/// - `.vtp` with ASCII arrays and one polyline through all points in order;
+/// - `.mrk.json` with one markup, LPS or RAS, in mm.
+///
+/// `.npz` and `.parquet` are written, not read.
 ///
 /// A file that names no unit gives [`LengthUnit::Unit`]; a CSV file names it in the column
 /// `arc_length[..]`.
@@ -127,8 +144,9 @@ pub fn read_curve(path: &Path) -> Result<CurveTable, IoError> {
         "csv" => curve_csv::read(path)?,
         "ply" => ply::read(path)?,
         "vtp" => vtp::read(path)?,
+        "mrk.json" => markups::read(path)?,
         "npy" => npy::read(path)?,
-        _ => return Err(unknown_extension(path)),
+        _ => return Err(unknown_extension(path, READ)),
     };
     curve.check(path)?;
     Ok(curve)
@@ -148,11 +166,19 @@ pub(crate) fn check_column_count(path: &Path, found: usize) -> Result<(), IoErro
 }
 
 fn extension(path: &Path) -> String {
-    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+    let lower = |part: &std::ffi::OsStr| part.to_string_lossy().to_ascii_lowercase();
+    let last = path.extension().map(lower).unwrap_or_default();
+    let before = path.file_stem().map(Path::new).and_then(Path::extension).map(lower);
+    if last == "json" && before.as_deref() == Some("mrk") { "mrk.json".to_owned() } else { last }
 }
 
-fn unknown_extension(path: &Path) -> IoError {
-    IoError::UnknownExtension { path: path.to_owned(), expected: EXTENSIONS }
+fn unknown_extension(path: &Path, expected: &'static str) -> IoError {
+    IoError::UnknownExtension { path: path.to_owned(), expected }
+}
+
+/// Whether [`write_curve`] knows the extension of this name.
+pub fn is_curve_file(path: &Path) -> bool {
+    WRITTEN.split(", ").any(|known| known.strip_prefix('.') == Some(extension(path).as_str()))
 }
 
 #[cfg(test)]
@@ -192,7 +218,7 @@ mod tests {
         with(|t| t.columns[0].unit = "m\nm".into(), "one trimmed line");
         with(|t| t.columns.push(t.columns[0].clone()), "the name is taken");
         with(|t| t.columns = vec![t.columns[0].clone(); 1025], "number of columns is 1025");
-        for extension in ["csv", "ply", "vtp", "npy"] {
+        for extension in ["csv", "ply", "vtp", "npy", "npz", "mrk.json"] {
             let path = folder.path().join(format!("curve.{extension}"));
             for (table, expected) in &bad {
                 let error = write_curve(&path, table).unwrap_err().to_string();
@@ -204,7 +230,7 @@ mod tests {
 
     #[test]
     fn an_unknown_extension_lists_the_known_ones() {
-        for name in ["curve.obj", "curve", ".csv"] {
+        for name in ["curve.obj", "curve", ".csv", "curve.json"] {
             let error = write_curve(Path::new(name), &table()).unwrap_err();
             assert!(error.to_string().contains(".vtp"), "{error}");
             assert!(matches!(read_curve(Path::new(name)), Err(IoError::UnknownExtension { .. })));

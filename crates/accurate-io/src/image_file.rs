@@ -137,6 +137,16 @@ pub fn write_u8(path: &Path, image: &Array2<u8>) -> Result<(), IoError> {
     write_png(path, size, image.iter().copied().collect::<Vec<u8>>(), DynamicImage::ImageLuma8)
 }
 
+/// An 8-bit grey PNG in memory, shape `(height, width)`, for what embeds images in other files.
+///
+/// # Errors
+/// As [`write_mask`], naming `<memory>`.
+pub fn png_bytes(image: &Array2<u8>) -> Result<Vec<u8>, IoError> {
+    let path = Path::new("<memory>");
+    let size = size_of(path, image.dim())?;
+    encode_png(path, size, image.iter().copied().collect::<Vec<u8>>(), DynamicImage::ImageLuma8)
+}
+
 /// Writes a 16-bit grey PNG, shape `(height, width)`.
 ///
 /// # Errors
@@ -263,10 +273,24 @@ fn size_of(path: &Path, (height, width): (usize, usize)) -> Result<(u32, u32), I
 
 fn write_png<T>(
     path: &Path,
-    (width, height): (u32, u32),
+    size: (u32, u32),
     values: Vec<T>,
     wrap: impl FnOnce(ImageBuffer<Luma<T>, Vec<T>>) -> DynamicImage,
 ) -> Result<(), IoError>
+where
+    Luma<T>: image::Pixel<Subpixel = T>,
+    T: image::Primitive,
+{
+    let png = encode_png(path, size, values, wrap)?;
+    write_atomically(path, |w| w.write_all(&png))
+}
+
+fn encode_png<T>(
+    path: &Path,
+    (width, height): (u32, u32),
+    values: Vec<T>,
+    wrap: impl FnOnce(ImageBuffer<Luma<T>, Vec<T>>) -> DynamicImage,
+) -> Result<Vec<u8>, IoError>
 where
     Luma<T>: image::Pixel<Subpixel = T>,
     T: image::Primitive,
@@ -277,7 +301,7 @@ where
     wrap(buffer)
         .write_to(&mut png, ImageFormat::Png)
         .map_err(|e| IoError::system(path, "encode", std::io::Error::other(e.to_string())))?;
-    write_atomically(path, |w| w.write_all(png.get_ref()))
+    Ok(png.into_inner())
 }
 
 fn to_array<T>(path: &Path, shape: (usize, usize), values: Vec<T>) -> Result<Array2<T>, IoError> {

@@ -3,7 +3,9 @@
 //!
 //! - [`read_pair`], [`write_pair`], [`find_pairs`]: the pair folder, the native input.
 //! - [`read_rig`], [`write_rig`]: two cameras in one TOML or JSON file.
-//! - [`read_curve`], [`write_curve`]: 3D curves as CSV, PLY, VTK PolyData or NPY.
+//! - [`read_curve`], [`write_curve`]: 3D curves as CSV, PLY, VTK PolyData, Slicer Markups,
+//!   NPY, NPZ or (feature `parquet`) Parquet.
+//! - [`write_mask_nifti`]: a mask as a NIfTI label map.
 //! - [`read_grey`], [`read_mask`] and their writers: images as arrays `[[y, x]]`.
 //! - [`read_manifest`]: what a data set is, where it comes from and under which licence.
 //!
@@ -27,29 +29,35 @@ mod finite_check;
 mod image_file;
 mod json;
 mod manifest;
+mod markups;
 mod matrix;
 mod meta;
+mod nifti_label;
 mod npy;
+mod npz;
 mod pair;
 mod pair_write;
+#[cfg(feature = "parquet")]
+mod parquet_file;
 mod ply;
 mod points;
 mod rig_file;
 mod vtp;
 
 pub use atomic::{remove_unfinished, write_atomically};
-pub use curve::{Column, CurveTable, read_curve, write_curve};
+pub use curve::{Column, CurveTable, is_curve_file, read_curve, write_curve};
 pub use distortion::{read_distortion, undistort_points};
 pub use error::IoError;
 pub use find::find_pairs;
 pub use fingerprint::{hash_bytes, hash_file, hash_pair};
 pub use image_file::{
-    BitDepth, GreyImage, MAX_IMAGE_SIDE_PX, read_grey, read_image_size, read_mask, write_grey,
-    write_mask, write_u8, write_u16,
+    BitDepth, GreyImage, MAX_IMAGE_SIDE_PX, png_bytes, read_grey, read_image_size, read_mask,
+    write_grey, write_mask, write_u8, write_u16,
 };
 pub use json::write_json;
 pub use manifest::{Generator, Manifest, ManifestFile, Split, read_manifest, read_manifests};
 pub use matrix::{read_matrix3, read_matrix3x4, write_matrix3, write_matrix3x4};
+pub use nifti_label::write_mask_nifti;
 pub use pair::{OrderedPoints, Pair, PairParts, Truth, read_pair};
 pub use pair_write::{PairContents, write_pair};
 pub use ply::{PlyEncoding, read_ply_points, write_ply_points};

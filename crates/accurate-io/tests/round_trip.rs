@@ -106,6 +106,35 @@ proptest! {
     }
 
     #[test]
+    fn a_markups_curve_keeps_what_needs_no_scaling_to_the_bit(curve in curves()) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("curve.mrk.json");
+        match write_curve(&path, &curve) {
+            Ok(()) => {}
+            // The largest metres are no finite millimetres.
+            Err(error) => {
+                prop_assert!(matches!(error, accurate_io::IoError::NotFinite { .. }), "{}", error);
+                return Ok(());
+            }
+        }
+        let read = read_curve(&path).unwrap();
+        prop_assert_eq!(column_bits(&read), column_bits(&curve));
+        prop_assert_eq!(read.unit, curve.unit);
+        if matches!(curve.unit, LengthUnit::Millimetre | LengthUnit::Unit) {
+            prop_assert_eq!(bits(&read.points), bits(&curve.points));
+        } else {
+            for (a, b) in read.points.iter().zip(&curve.points) {
+                // One product, one quotient: each rounds by half an ulp of a normal number, or by
+                // half the smallest subnormal.
+                let tolerance = |v: f64| 2.0 * f64::EPSILON * v.abs() + 2.0 * f64::from_bits(1);
+                for (x, y) in a.coords.iter().zip(b.coords.iter()) {
+                    prop_assert!((x - y).abs() <= tolerance(*y), "{} {}", x, y);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn an_npy_curve_keeps_every_bit_of_its_points(curve in curves()) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("curve.npy");

@@ -2,6 +2,7 @@ use std::fmt;
 
 use accurate_eval::EvalError;
 use accurate_fit::FitError;
+use accurate_io::IoError;
 use accurate_match::MatchError;
 use accurate_seg::SegError;
 use accurate_synth::SynthError;
@@ -108,6 +109,12 @@ pub enum Error {
     /// A case could not be generated.
     #[error(transparent)]
     Synthesis(#[from] SynthError),
+    /// An image of a report could not be encoded.
+    #[error("the report's images: {source}")]
+    Report {
+        /// What the encoder says.
+        source: IoError,
+    },
 }
 
 impl Error {
@@ -119,9 +126,11 @@ impl Error {
             Self::Matching { .. } => Some(Stage::Matching),
             Self::Fitting { .. } => Some(Stage::Fitting),
             Self::NoCandidate { .. } => Some(Stage::Matching),
-            Self::MissingInput { .. } | Self::Name(_) | Self::Scoring(_) | Self::Synthesis(_) => {
-                None
-            }
+            Self::MissingInput { .. }
+            | Self::Name(_)
+            | Self::Scoring(_)
+            | Self::Synthesis(_)
+            | Self::Report { .. } => None,
         }
     }
 }

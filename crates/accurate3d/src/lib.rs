@@ -21,23 +21,27 @@ pub use accurate_traverse as traverse;
 mod diagnostics;
 mod direction;
 mod error;
+mod explanation;
 mod method;
 mod ordered_points;
 mod pair;
 mod picture;
 mod reconstruct;
 mod reconstruction;
+mod report;
 mod robust;
 mod sampled_curve;
 pub mod table;
 
 pub use diagnostics::{CalibrationDiagnostics, Diagnostics, OutlineDiagnostics};
 pub use error::{Error, Stage};
+pub use explanation::{Alternative, ConsideredCurve, Explanation, JunctionDecision};
 pub use method::{InputKind, Method, UnknownName};
 pub use pair::ViewPair;
 pub use picture::picture_svg;
 pub use reconstruct::{Params, reconstruct};
 pub use reconstruction::{Reconstruction, Traces};
+pub use report::{Provenance, report_html};
 pub use robust::{RobustParams, Suspicion};
 
 /// The statement that stands in every report: this is research software.

@@ -3,7 +3,7 @@ use accurate_geom::{Pixel, View, View2};
 use accurate_match::{FreeMatch, FreeMatchParams, FreeMatcher, TangencyParams};
 
 use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled};
-use crate::{Diagnostics, Error, Params, Reconstruction, Traces, ViewPair};
+use crate::{Diagnostics, Error, Explanation, Params, Reconstruction, Traces, ViewPair};
 
 /// Our own method on ordered points: matched in the better direction with free ends and gaps, then
 /// one 3D spline adjusted to both views.
@@ -57,6 +57,7 @@ pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Recons
         along_epipolar_line,
         traces: Traces::given(points1.clone(), points2.clone(), matched.reversed),
         diagnostics,
+        explanation: Explanation::default(),
     })
 }
 

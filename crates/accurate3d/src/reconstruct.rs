@@ -10,7 +10,8 @@ use crate::ordered_points::adjusted_points;
 use crate::robust::reconstruct_masks;
 use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled};
 use crate::{
-    Diagnostics, Error, InputKind, Method, Reconstruction, RobustParams, Traces, ViewPair,
+    Diagnostics, Error, Explanation, InputKind, Method, Reconstruction, RobustParams, Traces,
+    ViewPair,
 };
 
 /// What to do with a pair.
@@ -105,6 +106,7 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
         along_epipolar_line,
         traces,
         diagnostics,
+        explanation: Explanation::default(),
     })
 }
 
@@ -127,6 +129,7 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
     let along_epipolar_line = along_epipolar_lines(&points, rig)
         .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;
     let diagnostics = Diagnostics::of_joint(&result, &along_epipolar_line);
+    let explanation = result.explanation.clone();
     Ok(Reconstruction {
         id: pair.id.clone(),
         method: params.method,
@@ -137,6 +140,7 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         along_epipolar_line,
         traces: Traces::walked(result),
         diagnostics,
+        explanation,
     })
 }
 

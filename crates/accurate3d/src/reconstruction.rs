@@ -5,7 +5,7 @@ use accurate_match::CurvePoint;
 use accurate_traverse::Trace;
 
 use crate::robust::JointResult;
-use crate::{Diagnostics, InputKind, Method};
+use crate::{Diagnostics, Explanation, InputKind, Method};
 
 /// A reconstructed 3D curve: at least one point, all finite.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,8 @@ pub struct Reconstruction {
     pub traces: Traces,
     /// How far the result can be trusted.
     pub diagnostics: Diagnostics,
+    /// What was considered and decided.
+    pub explanation: Explanation,
 }
 
 impl Reconstruction {
@@ -102,7 +104,7 @@ impl Reconstruction {
 }
 
 /// Square root of the largest eigenvalue.
-fn largest_sigma(covariance: &Matrix3<f64>) -> f64 {
+pub(crate) fn largest_sigma(covariance: &Matrix3<f64>) -> f64 {
     covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
 }
 

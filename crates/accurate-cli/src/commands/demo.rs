@@ -2,9 +2,10 @@ use accurate3d::io::{PairParts, Truth, read_pair, write_pair};
 use accurate3d::synth::{CaseOptions, Family, generate};
 use accurate3d::{InputKind, Method, NOT_FOR_CLINICAL_USE, Params, ViewPair, reconstruct};
 
-use super::reconstruct::{result_json, summary, write_outputs};
+use super::outputs::Outputs;
+use super::reconstruct::{result_json, summary};
 use super::synth::contents_of;
-use crate::args::{CurveFormat, DemoArgs, PointsKind};
+use crate::args::{DemoArgs, Extra, PointsKind};
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -24,8 +25,12 @@ pub fn run(args: &DemoArgs, console: &Console) -> Result<(), Failure> {
     let params = Params::new(InputKind::Mask, Method::default());
     let reconstruction = reconstruct(&pair, &params)?;
     let result = result_json(&dir, parts, &pair, &params, &reconstruction)?;
-    let formats = [CurveFormat::Ply, CurveFormat::Vtp];
-    write_outputs(&args.out, &pair, &reconstruction, &result, &formats, true)?;
+    let outputs = Outputs {
+        folder: Some(args.out.clone()),
+        extras: vec![Extra::Ply, Extra::Vtp, Extra::MrkJson, Extra::Picture, Extra::Report],
+        files: Vec::new(),
+    };
+    outputs.write(&pair, &reconstruction, &result)?;
     if console.json {
         return console.json(&result);
     }
@@ -40,7 +45,8 @@ pub fn run(args: &DemoArgs, console: &Console) -> Result<(), Failure> {
         scores["max_error"].as_f64().unwrap_or(f64::NAN),
     ))?;
     console.remark(&format!(
-        "written: {0}/picture.svg (look at it), {0}/curve.csv, .ply, .vtp, {0}/result.json\n{1}",
+        "written: {0}/report.html (open it), {0}/picture.svg, {0}/curve.csv, .ply, .vtp, .mrk.json, \
+         {0}/result.json\n{1}",
         args.out.display(),
         NOT_FOR_CLINICAL_USE
     ));

@@ -1,6 +1,7 @@
 mod demo;
 mod eval;
 mod explain;
+mod outputs;
 mod reconstruct;
 mod reproduce;
 mod shell;
@@ -25,8 +26,8 @@ pub fn run(cli: &Cli, config: &str) -> Result<(), Failure> {
         Command::Reconstruct(args) => {
             let result = reconstruct::run(args, &console);
             // No folder, no result: then there is nothing to repeat.
-            if args.out.is_dir() {
-                write_text(&args.out.join("config.toml"), config)?;
+            if let Some(folder) = args.out.iter().find(|path| path.is_dir()) {
+                write_text(&folder.join("config.toml"), config)?;
             }
             result
         }

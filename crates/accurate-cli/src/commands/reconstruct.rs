@@ -2,18 +2,16 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use accurate3d::fit::CalibrationPriors;
-use accurate3d::io::{PairParts, Truth, find_pairs, hash_pair, read_pair, write_curve, write_json};
-use accurate3d::{
-    InputKind, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair, picture_svg, reconstruct,
-};
+use accurate3d::io::{PairParts, Truth, find_pairs, hash_pair, read_pair};
+use accurate3d::{InputKind, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair, reconstruct};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::eval::table_scores;
-use crate::args::{CurveFormat, ReconstructArgs};
+use super::outputs::Outputs;
+use crate::args::ReconstructArgs;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::{make_folder, write_text};
 
 /// `accurate reconstruct`: every pair on its own; one that fails does not stop the others.
 pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
@@ -73,8 +71,9 @@ struct Done {
     suspect: Option<String>,
 }
 
-/// Pair folders with the folder each result goes to.
-fn jobs(args: &ReconstructArgs) -> Result<Vec<(PathBuf, PathBuf)>, Failure> {
+/// Pair folders with the places each result goes to.
+fn jobs(args: &ReconstructArgs) -> Result<Vec<(PathBuf, Outputs)>, Failure> {
+    let outputs = Outputs::of(args)?;
     let mut pairs = Vec::new();
     for path in &args.pairs {
         pairs.extend(find_pairs(path)?);
@@ -82,13 +81,21 @@ fn jobs(args: &ReconstructArgs) -> Result<Vec<(PathBuf, PathBuf)>, Failure> {
     if let [only] = pairs.as_slice()
         && args.pairs.first() == Some(only)
     {
-        return Ok(vec![(only.clone(), args.out.clone())]);
+        return Ok(vec![(only.clone(), outputs)]);
     }
-    let mut outs: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
-    for pair in &pairs {
+    if let Some(file) = outputs.files.first() {
+        let message =
+            format!("{} is one file, but there are {} pairs", file.display(), pairs.len());
+        return Err(Failure::new(Failure::USAGE, message)
+            .with_hint("give a folder, and --also for what each case's folder shall hold"));
+    }
+    let below = outputs.folder.clone().unwrap_or_default();
+    let mut taken: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+    let mut jobs = Vec::new();
+    for pair in pairs {
         let name = pair.canonicalize().ok().and_then(|p| p.file_name().map(|n| n.to_owned()));
-        let out = args.out.join(name.unwrap_or_else(|| "case".into()));
-        if let Some(other) = outs.insert(out.clone(), pair.clone()) {
+        let out = below.join(name.unwrap_or_else(|| "case".into()));
+        if let Some(other) = taken.insert(out.clone(), pair.clone()) {
             return Err(Failure::new(
                 Failure::USAGE,
                 format!(
@@ -100,57 +107,36 @@ fn jobs(args: &ReconstructArgs) -> Result<Vec<(PathBuf, PathBuf)>, Failure> {
             )
             .with_hint("run them with different --out folders"));
         }
+        jobs.push((pair, outputs.in_folder(out)));
     }
-    Ok(pairs
-        .into_iter()
-        .map(|pair| {
-            let out = outs.iter().find(|(_, p)| **p == pair).map(|(out, _)| out.clone());
-            (pair, out.unwrap_or_else(|| args.out.clone()))
-        })
-        .collect())
+    Ok(jobs)
 }
 
-fn one(dir: &Path, out: &Path, args: &ReconstructArgs) -> Result<Done, Failure> {
+fn one(dir: &Path, out: &Outputs, args: &ReconstructArgs) -> Result<Done, Failure> {
     let parts = PairParts {
         points: args.input == InputKind::Points,
         masks: args.input == InputKind::Mask,
         images: args.input == InputKind::Image,
         truth: Truth::IfPresent,
     };
-    let pair = ViewPair::from(read_pair(dir, parts)?);
+    // A report also shows what the method does not read.
+    let shown = PairParts {
+        masks: parts.masks || (out.has_report() && dir.join("masks").is_dir()),
+        images: parts.images || (out.has_report() && dir.join("images").is_dir()),
+        ..parts
+    };
+    let pair = ViewPair::from(read_pair(dir, shown)?);
     let mut params = Params::new(args.input, args.method);
     params.robust.calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
     let reconstruction = reconstruct(&pair, &params)?;
     let result = result_json(dir, parts, &pair, &params, &reconstruction)?;
-    write_outputs(out, &pair, &reconstruction, &result, &args.also, args.picture)?;
+    out.write(&pair, &reconstruction, &result)?;
     let doubted = !reconstruction.diagnostics.suspicions.is_empty();
     Ok(Done {
         line: summary(&reconstruction),
         json: result,
         suspect: doubted.then(|| reconstruction.id.clone()),
     })
-}
-
-/// Writes the curve, its extra formats, the picture and last `result.json`.
-pub fn write_outputs(
-    out: &Path,
-    pair: &ViewPair,
-    reconstruction: &Reconstruction,
-    result: &Value,
-    also: &[CurveFormat],
-    picture: bool,
-) -> Result<(), Failure> {
-    make_folder(out)?;
-    let table = reconstruction.curve_table();
-    write_curve(&out.join("curve.csv"), &table)?;
-    for format in also {
-        write_curve(&out.join("curve").with_extension(format.extension()), &table)?;
-    }
-    if picture {
-        write_text(&out.join("picture.svg"), &picture_svg(pair, reconstruction))?;
-    }
-    write_json(&out.join("result.json"), result)?;
-    Ok(())
 }
 
 /// What `result.json` says.

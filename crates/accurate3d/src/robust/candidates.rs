@@ -3,12 +3,13 @@ use accurate_geom::{Pixel, View};
 use accurate_match::{FreeEnds, SignalCurve};
 use accurate_seg::{Mask, distance_to_background, zhang_suen};
 use accurate_traverse::{
-    GraphParams, SkeletonGraph, Walk, WalkEnd, WalkParams, fill_small_holes,
+    GraphParams, HalfEdge, SkeletonGraph, Walk, WalkEnd, WalkParams, fill_small_holes,
     k_best_walks_with_reward,
 };
 use ndarray::Array2;
 
-use crate::Error;
+use crate::explanation::Alternative;
+use crate::{Error, JunctionDecision};
 
 /// Background kept around the body when the image is cut down to it, px.
 const MARGIN_PX: usize = 3;
@@ -102,6 +103,41 @@ impl<V: View> ViewCandidates<V> {
             .flatten()
             .map(|p| [p.x + self.origin[0], p.y + self.origin[1]])
             .collect()
+    }
+
+    /// What a walk did where it could have gone on otherwise.
+    pub(crate) fn junctions(&self, walk: usize) -> Vec<JunctionDecision> {
+        let [x0, y0] = self.origin;
+        let way = |half: &HalfEdge| self.way(half);
+        self.walks[walk]
+            .decisions
+            .iter()
+            .filter(|decision| !decision.alternatives.is_empty())
+            .map(|decision| JunctionDecision {
+                at: [decision.at.x + x0, decision.at.y + y0],
+                taken: way(&decision.left_along),
+                price: decision.price,
+                // Where turning round is not allowed at all, it is no alternative.
+                alternatives: decision
+                    .alternatives
+                    .iter()
+                    .filter(|(_, price)| price.is_finite())
+                    .map(|(half, price)| Alternative { way: way(half), price: *price })
+                    .collect(),
+            })
+            .collect()
+    }
+
+    /// A half-edge in words: where it has led after a few pixels.
+    fn way(&self, half: &HalfEdge) -> String {
+        const AHEAD: usize = 10;
+        let points = &self.graph.edges()[half.edge].points;
+        let last = points.len().saturating_sub(1);
+        let at = if half.reversed { last.saturating_sub(AHEAD) } else { AHEAD.min(last) };
+        match points.get(at) {
+            Some(p) => format!("to {:.0}, {:.0}", p.x + self.origin[0], p.y + self.origin[1]),
+            None => format!("along edge {}", half.edge),
+        }
     }
 
     /// The walks from number `from` on as candidates for pairing.

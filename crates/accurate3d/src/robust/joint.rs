@@ -11,7 +11,7 @@ use super::candidates::ViewCandidates;
 use super::score::Candidate;
 use super::search::Search;
 use super::suspicion::{Suspicion, suspicions};
-use crate::Error;
+use crate::{Error, Explanation};
 
 /// How hard the joint choice looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,6 +82,8 @@ pub(crate) struct JointResult {
     pub(crate) calibration: Option<CalibrationEstimate>,
     /// Reasons to doubt the result; none for most right ones.
     pub(crate) suspicions: Vec<Suspicion>,
+    /// What was considered and decided.
+    pub(crate) explanation: Explanation,
 }
 
 /// Curves nowhere farther apart than this do not compete, px.
@@ -128,11 +130,16 @@ pub(crate) fn reconstruct_masks(
             choice.best = best.refitted(fit, rig);
         }
     }
-    let Choice { best, margin, fits } = choice;
+    let Choice { best, rivals, margin, fits } = choice;
     let [i, j] = best.walks;
     let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
     let suspicions = suspicions(&best, margin, coverage, rig);
+    let explanation = Explanation {
+        candidates: std::iter::once(&best).chain(&rivals).map(Candidate::considered).collect(),
+        junctions: [view1.junctions(i), view2.junctions(j)],
+    };
     Ok(JointResult {
+        explanation,
         walk1: view1.walks[i].points.clone(),
         walk2: directed(&view2.walks[j].points, best.reversed),
         coverage,
@@ -147,6 +154,8 @@ pub(crate) fn reconstruct_masks(
 
 struct Choice {
     best: Candidate,
+    /// The other finalists, best first.
+    rivals: Vec<Candidate>,
     margin: f64,
     fits: usize,
 }
@@ -195,7 +204,8 @@ fn choose(
         .iter()
         .find(|rival| !rival.shape.is_like(&best.shape, RIVAL_PX))
         .map_or(f64::INFINITY, |rival| rival.score - best.score);
-    Ok(Choice { best, margin, fits })
+    let rivals = finalists.split_off(1);
+    Ok(Choice { best, rivals, margin, fits })
 }
 
 /// The bridges twice as wide as they come: what hides the body hides how it bends there.

@@ -4,6 +4,7 @@ use accurate_geom::Rig;
 use super::RobustParams;
 use super::search::SETTLED;
 use super::shape::{Shape, bending};
+use crate::ConsideredCurve;
 
 /// A stretch of outline that lies wholly this near to the end of a bridge is a cut face, px.
 const CUT_PX: f64 = 5.0;
@@ -100,6 +101,22 @@ impl Candidate {
         let mut candidate = Self { fit, shape, ..self.clone() };
         candidate.judge(rig);
         candidate
+    }
+
+    /// What a reader is told about it.
+    pub(crate) fn considered(&self) -> ConsideredCurve {
+        const SAMPLES: usize = 200;
+        let judgement = &self.fit.judgement;
+        ConsideredCurve {
+            walks: self.walks,
+            reversed: self.reversed,
+            score: self.score,
+            unexplained: self.misfit - judgement.outside,
+            outside: judgement.outside,
+            chi_per_point: judgement.chi_per_point(),
+            mean_distance_px: self.mean_distance_px,
+            points: self.fit.curve.sample(SAMPLES),
+        }
     }
 
     fn judge(&mut self, rig: &Rig) {
