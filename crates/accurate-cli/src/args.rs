@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use accurate3d::synth::Family;
 use accurate3d::table::{Format, ScoreKind};
-use accurate3d::{InputKind, Method};
+use accurate3d::{FigureKind, InputKind, Method};
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 
 use crate::code::Code;
@@ -75,6 +75,8 @@ pub enum Command {
     Trace(TraceArgs),
     /// Reconstruct and score a shipped pair, with a picture.
     Demo(DemoArgs),
+    /// Draw one of the paper's kinds of figure from our own data.
+    Figure(FigureArgs),
     /// Run a published experiment and record what it was run with, so that it can be verified.
     Reproduce(ReproduceArgs),
     /// Run a recorded experiment again and compare every file.
@@ -110,6 +112,25 @@ pub struct ExplainArgs {
 pub enum Experiment {
     /// Table 1: every method on the simulation's and the phantom's sets.
     Table1,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Figures:
+  overview    masks, ordered curves, correspondences and the 3D curve
+  gctt        the order that the paper's traversal and ours give to the same masks
+  ecdp        epipolar distances of all pairs of points, and the pairs that ECDP chose
+  simulation  curves of four methods on the truth, simulated cases
+  phantom     the same on the phantom's stand-in")]
+pub struct FigureArgs {
+    /// overview, gctt, ecdp, simulation or phantom.
+    pub kind: FigureKind,
+    /// Pair folders to show (default: generated cases).
+    #[arg(value_name = "PAIR")]
+    pub pairs: Vec<PathBuf>,
+    /// The SVG file.
+    #[arg(short, long, value_name = "FILE.svg")]
+    pub out: PathBuf,
 }
 
 #[derive(Debug, Args)]

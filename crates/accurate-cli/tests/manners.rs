@@ -29,6 +29,24 @@ fn bend() -> PathBuf {
 }
 
 #[test]
+fn figures_are_drawn_the_same_twice_and_only_as_svg() {
+    let dir = TempDir::new().unwrap();
+    let draw = |name: &str| {
+        let file = dir.path().join(name);
+        stdout(accurate(&["figure", "ecdp"]).arg(bend()).arg("-o").arg(&file));
+        fs::read(file).unwrap()
+    };
+    assert_eq!(draw("a.svg"), draw("b.svg"));
+    let (code, message) =
+        stderr_of_failure(accurate(&["figure", "ecdp", "-o"]).arg(dir.path().join("a.png")));
+    assert_eq!(code, 2);
+    assert!(message.contains("a.png"), "{message}");
+    let (code, message) = stderr_of_failure(&mut accurate(&["figure", "gcct", "-o", "x.svg"]));
+    assert_eq!(code, 2);
+    assert!(message.contains("gctt"), "{message}");
+}
+
+#[test]
 fn a_config_file_stands_in_for_options_and_the_command_line_wins() {
     let dir = TempDir::new().unwrap();
     let config = dir.path().join("lab.toml");

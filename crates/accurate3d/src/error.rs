@@ -109,6 +109,9 @@ pub enum Error {
     /// A case could not be generated.
     #[error(transparent)]
     Synthesis(#[from] SynthError),
+    /// A figure needs something to show.
+    #[error("the figure has no case to show")]
+    NoCase,
     /// An image of a report could not be encoded.
     #[error("the report's images: {source}")]
     Report {
@@ -130,6 +133,7 @@ impl Error {
             | Self::Name(_)
             | Self::Scoring(_)
             | Self::Synthesis(_)
+            | Self::NoCase
             | Self::Report { .. } => None,
         }
     }

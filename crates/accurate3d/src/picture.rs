@@ -1,11 +1,11 @@
 use std::fmt::Write;
 
-use accurate_geom::{Camera, Point2, Point3, nalgebra::Matrix3};
+use accurate_geom::{Camera, LengthUnit, Point2, Point3, nalgebra::Matrix3};
 use ndarray::Array2;
 
 use crate::{Reconstruction, ViewPair};
 
-const PANEL: f64 = 420.0;
+pub(crate) const PANEL: f64 = 420.0;
 const MARGIN: f64 = 18.0;
 const TITLE: f64 = 30.0;
 const FOOTER: f64 = 46.0;
@@ -49,7 +49,7 @@ pub fn picture_svg(pair: &ViewPair, reconstruction: &Reconstruction) -> String {
     svg
 }
 
-fn view_panel(
+pub(crate) fn view_panel(
     svg: &mut String,
     left: f64,
     number: usize,
@@ -61,7 +61,7 @@ fn view_panel(
     let scale = PANEL / f64::from(size.width.max(size.height));
     let (w, h) = (f64::from(size.width) * scale, f64::from(size.height) * scale);
     let x0 = left + (PANEL - w) / 2.0;
-    frame(svg, left, &format!("View {number}, {} x {} px", size.width, size.height));
+    titled_frame(svg, left, &format!("View {number}, {} x {} px", size.width, size.height));
     let _ = writeln!(
         svg,
         "<g transform=\"translate({:.3} {TITLE}) scale({scale:.6}) translate(0.5 0.5)\">\n\
@@ -88,14 +88,30 @@ fn view_panel(
 }
 
 /// The 3D curve seen along the direction in which it extends least, so that most of it shows.
-fn curve_panel(svg: &mut String, left: f64, pair: &ViewPair, reconstruction: &Reconstruction) {
-    let curve = reconstruction.positions();
+pub(crate) fn curve_panel(
+    svg: &mut String,
+    left: f64,
+    pair: &ViewPair,
+    reconstruction: &Reconstruction,
+) {
     let truth = pair.truth.as_deref().unwrap_or(&[]);
     let title = if truth.is_empty() { "3D curve" } else { "3D curve (orange) on truth (grey)" };
-    frame(svg, left, title);
-    let reference = if truth.is_empty() { &curve[..] } else { truth };
+    plane_panel(svg, left, title, truth, &reconstruction.positions(), reconstruction.unit);
+}
+
+/// A curve of at least one point in orange on a truth, which may be empty, in grey.
+pub(crate) fn plane_panel(
+    svg: &mut String,
+    left: f64,
+    title: &str,
+    truth: &[Point3],
+    curve: &[Point3],
+    unit: LengthUnit,
+) {
+    titled_frame(svg, left, title);
+    let reference = if truth.is_empty() { curve } else { truth };
     let flatten = principal_plane(reference);
-    let points: Vec<Point2> = reference.iter().chain(&curve).map(&flatten).collect();
+    let points: Vec<Point2> = reference.iter().chain(curve).map(&flatten).collect();
     let (low, high) =
         points.iter().fold((points[0], points[0]), |(low, high), p| (low.inf(p), high.sup(p)));
     let extent = (high - low).amax().max(f64::MIN_POSITIVE);
@@ -115,11 +131,11 @@ fn curve_panel(svg: &mut String, left: f64, pair: &ViewPair, reconstruction: &Re
          <text x=\"{x:.1}\" y=\"{:.1}\" fill=\"#333\">{bar} {}</text>",
         bar * scale,
         y - 6.0,
-        reconstruction.unit
+        unit
     );
 }
 
-fn frame(svg: &mut String, left: f64, title: &str) {
+pub(crate) fn titled_frame(svg: &mut String, left: f64, title: &str) {
     let _ = writeln!(
         svg,
         "<text x=\"{left:.1}\" y=\"20\" fill=\"#111\">{title}</text>\n<rect x=\"{left:.1}\" \
@@ -127,7 +143,12 @@ fn frame(svg: &mut String, left: f64, title: &str) {
     );
 }
 
-fn polyline(svg: &mut String, points: impl Iterator<Item = (f64, f64)>, colour: &str, width: f64) {
+pub(crate) fn polyline(
+    svg: &mut String,
+    points: impl Iterator<Item = (f64, f64)>,
+    colour: &str,
+    width: f64,
+) {
     let mut path = String::new();
     for (i, (x, y)) in points.enumerate() {
         let _ = write!(path, "{}{x:.2} {y:.2}", if i == 0 { "M" } else { "L" });
@@ -142,7 +163,7 @@ fn polyline(svg: &mut String, points: impl Iterator<Item = (f64, f64)>, colour: 
 }
 
 /// One rectangle per horizontal run of foreground.
-fn mask_runs(mask: &Array2<bool>) -> String {
+pub(crate) fn mask_runs(mask: &Array2<bool>) -> String {
     let mut path = String::new();
     for (y, row) in mask.rows().into_iter().enumerate() {
         let mut start = None;
@@ -193,7 +214,7 @@ fn nice_length(length: f64) -> f64 {
         }
 }
 
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 

@@ -1,6 +1,7 @@
 mod demo;
 mod eval;
 mod explain;
+mod figure;
 mod outputs;
 mod reconstruct;
 mod reproduce;
@@ -34,6 +35,7 @@ pub fn run(cli: &Cli, config: &str) -> Result<(), Failure> {
         Command::Synth(args) => synth::run(args, &console),
         Command::Eval(args) => eval::run(args, &console),
         Command::Table(args) => table::run(args, &console),
+        Command::Figure(args) => figure::run(args, &console),
         Command::Trace(args) => trace::run(args, &console),
         Command::Demo(args) => demo::run(args, &console),
         Command::Reproduce(args) => reproduce::run(args, &console),

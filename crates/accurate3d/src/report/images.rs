@@ -47,6 +47,12 @@ pub(super) fn cost_image(traces: &Traces, rig: &Rig) -> Result<Value, Error> {
     if rows == 0 || columns == 0 {
         return Ok(Value::Null);
     }
+    Ok(json!({"rows": rows, "columns": columns, "image": cost_url(traces, rig)?}))
+}
+
+/// That picture as a data URL; the traces must not be empty.
+pub(crate) fn cost_url(traces: &Traces, rig: &Rig) -> Result<String, Error> {
+    let (rows, columns) = (traces.points1.len(), traces.points2.len());
     let shape = (rows.min(MOST_CELLS), columns.min(MOST_CELLS));
     let f = rig.fundamental();
     let mut grey = Array2::from_elem(shape, 255u8);
@@ -60,7 +66,7 @@ pub(super) fn cost_image(traces: &Traces, rig: &Rig) -> Result<Value, Error> {
             grey[[row, column]] = ((d / BRIGHT_PX).min(1.0).sqrt() * 255.0).round() as u8;
         }
     }
-    Ok(json!({"rows": rows, "columns": columns, "image": data_url(&grey)?}))
+    data_url(&grey)
 }
 
 fn data_url(grey: &Array2<u8>) -> Result<String, Error> {

@@ -3,6 +3,8 @@
 mod content;
 mod images;
 
+pub(crate) use images::cost_url;
+
 use serde_json::Value;
 
 use crate::{Error, Reconstruction, ViewPair};
