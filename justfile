@@ -31,6 +31,18 @@ bench *ARGS:
 peers:
     bash benchmarks/peers/run
 
+# Every curve file, opened by the tools that people use (Python, pinned).
+formats:
+    bash benchmarks/peers/formats
+
+# The page behind --report, bundled anew (Node.js) and committed.
+report:
+    npm --prefix web/report ci && npm --prefix web/report run build
+
+# Reports in a headless Chromium, if there is one.
+check-report:
+    bash web/report/check
+
 # The book, if mdbook is installed.
 book:
     mdbook build docs

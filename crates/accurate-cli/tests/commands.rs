@@ -91,14 +91,23 @@ fn the_same_bytes_for_any_number_of_threads() {
     let run = |threads: &str| {
         let out = dir.path().join(threads);
         accurate()
-            .args(["reconstruct", "--input", "mask", "--threads", threads, "--picture", "--out"])
+            .args(["reconstruct", "--input", "mask", "--threads", threads, "--picture"])
+            .args(["--also", "report,mrk-json,npz,parquet", "--out"])
             .arg(&out)
             .args(["bend", "loop", "wire"].map(|name| samples().join(name)))
             .assert()
             .success();
         ["bend", "loop", "wire"].map(|case| {
-            ["curve.csv", "result.json", "picture.svg"]
-                .map(|file| fs::read(out.join(case).join(file)).unwrap())
+            [
+                "curve.csv",
+                "result.json",
+                "picture.svg",
+                "report.html",
+                "curve.mrk.json",
+                "curve.npz",
+                "curve.parquet",
+            ]
+            .map(|file| fs::read(out.join(case).join(file)).unwrap())
         })
     };
     let one = run("1");
