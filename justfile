@@ -46,3 +46,10 @@ check-report:
 # The book, if mdbook is installed.
 book:
     mdbook build docs
+
+# Trains the segmentation network, or goes on training it (Python with training/requirements.lock; docs/training.md).
+train COUNT="4096" *ARGS="":
+    cargo run --release -- synth xray --shards out/shards/validation --count 64 --seed 1500
+    cargo run --release -- synth xray --shards out/shards/training --count {{COUNT}} --seed 2000
+    PYTHONPATH=training OMP_WAIT_POLICY=PASSIVE GOMP_SPINCOUNT=0 python -m accurate_training train \
+        --shards out/shards/training --validation out/shards/validation --run out/run {{ARGS}}

@@ -1,4 +1,4 @@
-"""`python -m accurate_training train|export|evaluate|ablate|plot`."""
+"""`python -m accurate_training train|export|evaluate|ablate|plot|card|fixture`."""
 
 import argparse
 import sys
@@ -30,9 +30,11 @@ def _train(options: argparse.Namespace) -> None:
     torch.set_num_threads(options.threads)
     config = replace(TrainConfig(), **{
         name: getattr(options, name)
-        for name in ("width", "steps", "seed", "learning_rate")
+        for name in ("width", "steps", "seed", "learning_rate", "final_share", "final_batch")
         if getattr(options, name) is not None
     })
+    if options.dice is not None:
+        config = replace(config, loss=replace(config.loss, dice=options.dice))
     trainer = Trainer(
         config,
         shards=options.shards,
@@ -105,6 +107,18 @@ def _plot(options: argparse.Namespace) -> None:
     plot_runs(options.run, options.output)
 
 
+def _card(options: argparse.Namespace) -> None:
+    from .card import write_card
+
+    write_card(options.output, options.model, runs=options.run, shards=options.shards, scores=options.scores)
+
+
+def _fixture(options: argparse.Namespace) -> None:
+    from .fixture import write_fixture
+
+    write_fixture(options.folder)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="accurate_training", description=__doc__)
     commands = parser.add_subparsers(required=True)
@@ -118,6 +132,9 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--steps", type=int, help="length of the schedule; may differ on resuming")
     train.add_argument("--seed", type=int)
     train.add_argument("--learning-rate", type=float)
+    train.add_argument("--final-share", type=float, help="share of the steps at whole images")
+    train.add_argument("--final-batch", type=int)
+    train.add_argument("--dice", type=float, help="weight of a soft Dice term beside the paper's loss (0)")
     train.add_argument("--until", type=int, help="stop at this step, with a checkpoint")
     train.add_argument("--threads", type=int, default=1)
     train.set_defaults(run_command=_train)
@@ -153,6 +170,18 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("run", type=Path, nargs="+")
     plot.add_argument("--output", type=Path, required=True)
     plot.set_defaults(run_command=_plot)
+
+    card = commands.add_parser("card", help="write the card of an exported network")
+    card.add_argument("model", type=Path)
+    card.add_argument("output", type=Path)
+    card.add_argument("--run", type=Path, nargs="+", required=True, help="runs that led to it, in order")
+    card.add_argument("--shards", type=Path, required=True, help="folder of the last run's shards")
+    card.add_argument("--scores", type=Path, help="JSON of `evaluate`")
+    card.set_defaults(run_command=_card)
+
+    fixture = commands.add_parser("fixture", help="write the tiny network for the Rust engines")
+    fixture.add_argument("folder", type=Path)
+    fixture.set_defaults(run_command=_fixture)
     return parser
 
 

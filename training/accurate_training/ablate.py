@@ -22,7 +22,6 @@ ARMS: dict[str, LossParams] = {
     "CE + Dice + clDice": LossParams(skeleton_recall=0, cl_dice=1, dice=1),
     "CE + Dice + skeleton recall": LossParams(skeleton_recall=1, cl_dice=0, dice=1),
     "CE + Dice + clDice + skeleton recall": LossParams(skeleton_recall=1, cl_dice=1, dice=1),
-    "CE + clDice + skeleton recall (the paper's)": LossParams(),
 }
 
 

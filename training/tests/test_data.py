@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-
 from accurate_training.augment import AugmentParams, bend_greys, enlarge, turn
 from accurate_training.batches import draw_batch
 from accurate_training.normalise import STD_FLOOR, z_score
 from accurate_training.shards import ShardError, ShardPool
+
 from tests.conftest import write_shard
 
 

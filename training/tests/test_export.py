@@ -5,14 +5,14 @@ import onnx
 import onnxruntime
 import pytest
 import torch
-from onnx import TensorProto
-
 from accurate_training.__main__ import main
 from accurate_training.checkpoint import Checkpoint
 from accurate_training.export import OPSET, ExportError, export_onnx
 from accurate_training.import_weights import WeightError, load_onnx_weights
 from accurate_training.network import build_network, parameter_count, stage_features
 from accurate_training.trainer import CHECKPOINT, Trainer
+from onnx import TensorProto
+
 from tests.test_resume import CONFIG
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import torch
-
 from accurate_training.losses import (
     EPSILON,
     LossParams,
@@ -151,6 +150,5 @@ def test_a_crop_without_a_wire_is_finite_and_moves_only_the_other_terms():
 
 def test_a_loss_without_terms_is_refused():
     with pytest.raises(ValueError, match="weight zero"):
-        composite_loss(
-            torch.zeros(1, 2, 4, 4), *(torch.zeros(1, 4, 4),) * 3, LossParams(skeleton_recall=0, cl_dice=0, cross_entropy=0)
-        )
+        nothing = LossParams(skeleton_recall=0, cl_dice=0, cross_entropy=0)
+        composite_loss(torch.zeros(1, 2, 4, 4), *(torch.zeros(1, 4, 4),) * 3, nothing)

@@ -1,7 +1,6 @@
 """Smoke test: the network, the losses and the optimiser together learn one batch by heart."""
 
 import torch
-
 from accurate_training.augment import AugmentParams
 from accurate_training.batches import draw_batch
 from accurate_training.losses import LossParams, composite_loss

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 import torch
-
 from accurate_training.checkpoint import Checkpoint, CheckpointError
 from accurate_training.configuration import TrainConfig
 from accurate_training.curves import read_curve
 from accurate_training.shards import ShardError
 from accurate_training.trainer import CHECKPOINT, STEP_CURVE, VALIDATION_CURVE, Trainer
+
 from tests.conftest import write_shard
 
 CONFIG = TrainConfig(

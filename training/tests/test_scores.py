@@ -4,8 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from skimage.morphology import skeletonize
-
 from accurate_training.__main__ import main
 from accurate_training.evaluate import bootstrap, markdown_table, onnx_segmenter, score_method
 from accurate_training.export import export_onnx
@@ -14,6 +12,7 @@ from accurate_training.metrics import centreline_distance, near_share, score_mas
 from accurate_training.network import build_network
 from accurate_training.predict import wire_probability
 from accurate_training.shards import ShardPool
+from skimage.morphology import skeletonize
 
 
 def bar(rows, columns, shape=(40, 60)):
