@@ -35,6 +35,8 @@ for (const file of words) {
   console.log(path);
   const context = await browser.newContext({ viewport: { width: 1440, height: 1000 }, offline: true, colorScheme: "light" });
   const page = await context.newPage();
+  // Software rendering on a busy machine is slow; how fast it is is not checked here.
+  page.setDefaultTimeout(120_000);
   const complaints = [];
   const asked = [];
   page.on("console", (message) => { if (["error", "warning"].includes(message.type()) && !/GPU stall|GL Driver/.test(message.text())) complaints.push(message.text()); });
@@ -106,7 +108,7 @@ for (const file of words) {
   if (shots) {
     await page.evaluate(() => { window.accurateReport.pick(Math.floor(window.accurateReport.count / 3)); window.scrollTo(0, 0); });
     await page.waitForTimeout(800);
-    const png = await page.screenshot();
+    const png = await page.screenshot({ timeout: 180_000 });
     const name = basename(path, ".html") === "report" ? basename(dirname(path)) : basename(path, ".html");
     const known = join(shots, `${name}.png`);
     if (existsSync(known)) {
