@@ -47,6 +47,8 @@ pub(crate) struct Candidate {
     cuts: CutEnds,
     pub(crate) fit: OutlineFit,
     pub(crate) shape: Shape,
+    /// The curve that the first fit started from.
+    pub(crate) start: Shape,
     /// Settings for carrying the fit on.
     pub(crate) settings: OutlineFitParams,
     /// Whether it is good, perhaps only with finer knots.
@@ -71,6 +73,7 @@ pub(crate) struct Origin {
     pub(crate) walks_cost: f64,
     pub(crate) mean_distance_px: f64,
     pub(crate) proposal_score: f64,
+    pub(crate) start: Shape,
 }
 
 impl Candidate {
@@ -83,6 +86,7 @@ impl Candidate {
             cuts: origin.cuts.clone(),
             shape: Shape::new(&fit.curve, rig),
             fit,
+            start: origin.start.clone(),
             settings: SETTLED,
             good: false,
             misfit: 0.0,
