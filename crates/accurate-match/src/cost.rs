@@ -201,6 +201,42 @@ impl CostModel {
     pub fn signed_distance_in_view2(&self, i: usize, j: usize) -> Option<f64> {
         self.images2[i].and_then(|image| image.signed_distance(self.curve2[j]))
     }
+
+    /// Whether every ray has a line in every view that the kind measures in.
+    pub(crate) fn all_lines(&self) -> bool {
+        let all = |lines: bool, needed: bool| lines || !needed;
+        let in_view1 = self.lineless2.is_empty();
+        let in_view2 = self.images2.iter().all(|image| matches!(image, Some(RayImage::Line(_))));
+        all(in_view1, self.kind != DistanceKind::View2)
+            && all(in_view2, self.kind != DistanceKind::View1)
+    }
+
+    /// Coefficients of the line of point `j` in view 1.
+    pub(crate) fn line1(&self, j: usize) -> Option<[f64; 3]> {
+        coefficients(self.images1[j].as_ref())
+    }
+
+    /// Coefficients of the line of point `i` in view 2.
+    pub(crate) fn line2(&self, i: usize) -> Option<[f64; 3]> {
+        coefficients(self.images2[i].as_ref())
+    }
+
+    /// Squared gradient of `p1ᵀ F p2` by `p1` at point `j` of view 2.
+    pub(crate) fn gradient1(&self, j: usize) -> f64 {
+        self.gradients1[j]
+    }
+
+    /// Squared gradient of `p1ᵀ F p2` by `p2` at point `i` of view 1.
+    pub(crate) fn gradient2(&self, i: usize) -> f64 {
+        self.gradients2[i]
+    }
+}
+
+fn coefficients<V: View>(image: Option<&RayImage<V>>) -> Option<[f64; 3]> {
+    match image? {
+        RayImage::Line(line) => Some((*line.coefficients()).into()),
+        RayImage::Point(_) => None,
+    }
 }
 
 /// Refuses an empty curve and a point that is not finite, naming it.

@@ -2,7 +2,7 @@ use accurate_geom::{Pixel, Rig, Triangulation, View1, View2};
 
 use crate::{
     Alignment, CostModel, CurveMatcher, CurveReconstruction, DistanceKind, MatchError, PixelPair,
-    RefineDirections, RefineRule, TieOrder, align_rows, refine, triangulate_pairs,
+    RefineDirections, RefineRule, TieOrder, align_curves, refine, triangulate_pairs,
 };
 
 /// What [`Ecdp`] leaves to choose.
@@ -44,7 +44,7 @@ impl EcdpParams {
 /// ACCURATE, section 2.3.
 ///
 /// # Cost
-/// O(n1·n2) time, 2 bits per pair of points of memory.
+/// As [`align_curves`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ecdp {
     /// The choices.
@@ -60,7 +60,7 @@ impl Ecdp {
     /// The first stage alone: the path, and its total cost in px.
     ///
     /// # Errors
-    /// As [`CostModel::new`] and [`align_rows`].
+    /// As [`CostModel::new`] and [`align_curves`].
     pub fn align(
         &self,
         curve1: &[Pixel<View1>],
@@ -95,7 +95,7 @@ impl Ecdp {
     }
 
     fn align_costs(&self, costs: &CostModel) -> Result<Alignment, MatchError> {
-        align_rows(costs.n1(), costs.n2(), |i, row| costs.fill_row(i, row), self.params.ties)
+        align_curves(costs, self.params.ties)
     }
 }
 

@@ -37,6 +37,7 @@ mod propose;
 mod ray_image;
 mod refine;
 mod tangency;
+mod wavefront;
 mod zero_set;
 
 pub use angle_signal::{AngleProfile, AngleSignal};
@@ -56,4 +57,5 @@ pub use refine::{
     ON_LINE_PX, RefineDirections, RefineRule, horizontal_runs, longest_run, refine, vertical_runs,
 };
 pub use tangency::{PointFlag, TangencyParams, tangency_sines1, tangency_sines2};
+pub use wavefront::align_curves;
 pub use zero_set::{MatchedPosition, zero_crossings};
