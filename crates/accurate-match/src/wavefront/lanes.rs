@@ -5,7 +5,7 @@ use pulp::{Scalar256b, Simd};
 /// [`Simd::F64_LANES`] neighbouring rows, 4 or 8.
 pub(super) trait Lanes: Simd {
     /// Every row of `v` sees the row above it: lane 0 gets the last lane of `above`.
-    fn from_above(self, above: Self::f64s, v: Self::f64s) -> Self::f64s;
+    fn shifted_down(self, above: Self::f64s, v: Self::f64s) -> Self::f64s;
 
     /// The last lane, which is the lowest row.
     fn last(self, v: Self::f64s) -> f64;
@@ -30,7 +30,7 @@ mod x86_64 {
 
     impl Lanes for V4 {
         #[inline(always)]
-        fn from_above(self, above: Self::f64s, v: Self::f64s) -> Self::f64s {
+        fn shifted_down(self, above: Self::f64s, v: Self::f64s) -> Self::f64s {
             let (v, above): (__m512i, __m512i) = (cast(v), cast(above));
             cast(self.avx512f._mm512_alignr_epi64::<7>(v, above))
         }
@@ -49,7 +49,7 @@ mod x86_64 {
 
     impl Lanes for V3 {
         #[inline(always)]
-        fn from_above(self, above: Self::f64s, v: Self::f64s) -> Self::f64s {
+        fn shifted_down(self, above: Self::f64s, v: Self::f64s) -> Self::f64s {
             // Both turned by one lane, then lane 0 of the one and lanes 1 to 3 of the other.
             const TURN: i32 = 0b10_01_00_11;
             let (v, above): (__m256d, __m256d) = (cast(v), cast(above));
@@ -75,7 +75,7 @@ mod x86_64 {
 /// For every other machine: four rows at a time, in whatever vectors the compiler finds.
 impl Lanes for Scalar256b {
     #[inline(always)]
-    fn from_above(self, above: Self::f64s, v: Self::f64s) -> Self::f64s {
+    fn shifted_down(self, above: Self::f64s, v: Self::f64s) -> Self::f64s {
         let (v, above): ([f64; 4], [f64; 4]) = (cast(v), cast(above));
         cast([above[3], v[0], v[1], v[2]])
     }

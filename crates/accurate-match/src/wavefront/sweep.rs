@@ -121,7 +121,7 @@ impl<S: Lanes> Sweep<'_, S> {
             (_, 0) => f64::INFINITY,
             _ => edge.values[first - 1],
         };
-        above_before[0] = simd.from_above(simd.splat_f64s(corner), infinite);
+        above_before[0] = simd.shifted_down(simd.splat_f64s(corner), infinite);
         let mut taken = most_steps;
         let mut at = columns.position(first);
         for t in 0..most_steps {
@@ -130,7 +130,7 @@ impl<S: Lanes> Sweep<'_, S> {
             let out = if RECORD { &mut record.bits[out..out + step_bytes] } else { &mut [] };
             for v in 0..VECTORS {
                 let left = now[v];
-                let up = simd.from_above(neighbour, left);
+                let up = simd.shifted_down(neighbour, left);
                 neighbour = left;
                 let diagonal = above_before[v];
                 above_before[v] = up;
