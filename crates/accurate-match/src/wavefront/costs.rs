@@ -26,7 +26,7 @@ impl Columns {
     /// has no line, or if a number is out of range: the plain kernel knows what to do.
     pub fn of(costs: &CostModel, stride: usize) -> Option<Self> {
         let thinned = |n: usize| {
-            let last = (n - 1) % stride != 0;
+            let last = !(n - 1).is_multiple_of(stride);
             (0..n).step_by(stride).chain(last.then_some(n - 1))
         };
         let needs = |own: DistanceKind, which: usize| match costs.kind() {

@@ -152,7 +152,8 @@ impl<S: Lanes> Sweep<'_, S> {
             if t + 1 >= Self::ROWS {
                 edge.values[first + t + 1 - Self::ROWS] = simd.last(now[VECTORS - 1]);
             }
-            if t % LOOK_EVERY == 0 && first + t >= edge.live.end && first + t < n2 && t > 0 {
+            if t.is_multiple_of(LOOK_EVERY) && first + t >= edge.live.end && first + t < n2 && t > 0
+            {
                 let all = (0..VECTORS).fold(infinite, |least, v| {
                     simd.min_f64s(least, simd.min_f64s(now[v], above_before[v]))
                 });
