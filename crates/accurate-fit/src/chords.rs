@@ -14,9 +14,6 @@ pub(crate) struct Chords {
     arc: Vec<f64>,
 }
 
-/// Chords that are one in the search for nearest points.
-const NEAREST_STEP: usize = 2;
-
 /// The nearest point of a projected curve: squared distance (infinite: none within reach) and the
 /// curve parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,13 +124,8 @@ impl Chords {
     ) {
         found.clear();
         found.resize(outline.points.len(), Nearest { squared: radius_px * radius_px, u: f64::NAN });
-        // Every second point: half the visits, and the sag of 3 px of curve only moves the parameter,
-        // which the caller refines.
-        let last = self.points.len() - 1;
-        for first in (0..last).step_by(NEAREST_STEP) {
-            let next = (first + NEAREST_STEP).min(last);
-            let (a, b) = (self.points[first], self.points[next]);
-            let (k, width) = (first as f64, (next - first) as f64);
+        for (k, pair) in self.points.windows(2).enumerate() {
+            let (a, b) = (pair[0], pair[1]);
             let e = b - a;
             let inverse = 1.0 / e.norm_squared().max(f64::MIN_POSITIVE);
             let bounds = [
@@ -153,7 +145,7 @@ impl Chords {
                     let (rx, ry) = (dx - t * e.x, dy - t * e.y);
                     let squared = rx * rx + ry * ry;
                     if squared < n.squared {
-                        *n = Nearest { squared, u: k + width * t };
+                        *n = Nearest { squared, u: k as f64 + t };
                     }
                 }
             });
@@ -174,59 +166,4 @@ impl Chords {
 #[inline]
 pub(crate) fn is_sampled(i: usize, stride: usize) -> bool {
     ((i as u32).wrapping_mul(2_654_435_769) >> 16).is_multiple_of(stride as u32)
-}
-
-#[cfg(test)]
-mod tests {
-    use accurate_geom::View1;
-    use ndarray::Array2;
-    use proptest::prelude::*;
-
-    use super::*;
-    use crate::Outline;
-
-    /// Where the pair of chords that holds parameter `place` (in points) has that place.
-    fn on_pair(points: &[Vector2<f64>], place: f64) -> Vector2<f64> {
-        let last = points.len() - 1;
-        let first = ((place as usize) / NEAREST_STEP * NEAREST_STEP).min((last - 1) & !1);
-        let next = (first + NEAREST_STEP).min(last);
-        let t = (place - first as f64) / (next - first) as f64;
-        points[first] + (points[next] - points[first]) * t
-    }
-
-    proptest! {
-        #[test]
-        fn the_nearest_point_is_as_near_as_a_search_of_all_pairs_of_chords_finds(
-            bits in prop::collection::vec(prop::bool::weighted(0.2), 20 * 20),
-            points in prop::collection::vec((0.0..20.0f64, 0.0..20.0f64), 2..9),
-            radius_px in 1.0..8.0f64,
-        ) {
-            let mut mask = Array2::from_shape_vec((20, 20), bits).unwrap();
-            (mask[[3, 4]], mask[[3, 5]]) = (true, false);
-            let outline = Outline::<View1>::from_mask(mask.view()).unwrap();
-            let points: Vec<_> = points.into_iter().map(|(x, y)| Vector2::new(x, y)).collect();
-            let chords = Chords { steps: 4, points: points.clone(), arc: Vec::new() };
-            let mut found = Vec::new();
-            chords.nearest(&outline.data, radius_px, 1, &mut found);
-            for (p, n) in outline.data.points.iter().zip(&found) {
-                let q = Vector2::new(p[0], p[1]);
-                let last = points.len() - 1;
-                let least = (0..last).step_by(NEAREST_STEP).map(|k| {
-                    let (a, e) = (points[k], points[(k + NEAREST_STEP).min(last)] - points[k]);
-                    let t = (q - a).dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE);
-                    (q - a - e * t.clamp(0.0, 1.0)).norm_squared()
-                }).fold(f64::INFINITY, f64::min);
-                // A dozen operations on squares of up to 800 px².
-                let tol = 12.0 * 800.0 * f64::EPSILON;
-                if least < radius_px * radius_px - tol {
-                    prop_assert!((n.squared - least).abs() < tol, "{n:?} {least}");
-                    let at = on_pair(&points, n.u * 4.0);
-                    // The root of a square near zero has half its digits.
-                    prop_assert!(((q - at).norm() - least.sqrt()).abs() < 1e-6, "{n:?} {at}");
-                } else if least > radius_px * radius_px + tol {
-                    prop_assert!(n.squared == f64::INFINITY && n.u.is_nan());
-                }
-            }
-        }
-    }
 }

@@ -47,8 +47,6 @@ pub(crate) struct Candidate {
     cuts: CutEnds,
     pub(crate) fit: OutlineFit,
     pub(crate) shape: Shape,
-    /// The curve that the first fit started from.
-    pub(crate) start: Shape,
     /// Settings for carrying the fit on.
     pub(crate) settings: OutlineFitParams,
     /// Whether it is good, perhaps only with finer knots.
@@ -73,7 +71,6 @@ pub(crate) struct Origin {
     pub(crate) walks_cost: f64,
     pub(crate) mean_distance_px: f64,
     pub(crate) proposal_score: f64,
-    pub(crate) start: Shape,
 }
 
 impl Candidate {
@@ -86,7 +83,6 @@ impl Candidate {
             cuts: origin.cuts.clone(),
             shape: Shape::new(&fit.curve, rig),
             fit,
-            start: origin.start.clone(),
             settings: SETTLED,
             good: false,
             misfit: 0.0,

@@ -5,7 +5,6 @@ use accurate_match::{FreeEnds, Proposal, propose_pairs};
 use super::RobustParams;
 use super::candidates::{ViewCandidates, free_ends};
 use super::score::{Candidate, Origin};
-use super::shape::Shape;
 use super::start::{OTHER_PRICES, PRICES, start_from};
 use crate::Error;
 
@@ -97,7 +96,6 @@ impl Search<'_> {
             walks_cost: walk1.cost.total() + walk2.cost.total(),
             mean_distance_px,
             proposal_score: proposal.score,
-            start: Shape::new(&start, self.rig),
         };
         let judge = |fit| Candidate::new(fit, &origin, self.rig, self.params);
         let plain = self.fit(&start, &OutlineFitParams::DEFAULT).map(judge);
@@ -149,18 +147,9 @@ impl Search<'_> {
                 OutlineFitParams::DEFAULT.knot_spacing_px,
             );
             let Some((start, _)) = start else { continue };
-            // The same start again, or one in the same basin, gives the same fit.
-            let shape = Shape::new(&start, self.rig);
-            if shape.is_like(&candidate.start, SAME_PX) || shape.is_like(&candidate.shape, SAME_PX)
-            {
-                continue;
-            }
             for params in [OutlineFitParams::DEFAULT, OutlineFitParams::ANNEALED] {
                 if let Some(fit) = self.fit(&start, &params) {
                     more.push(candidate.refitted(fit, self.rig));
-                }
-                if more.last().is_some_and(|fit| fit.is_good(self.params)) {
-                    break;
                 }
             }
         }
