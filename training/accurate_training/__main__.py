@@ -9,6 +9,7 @@ from .checkpoint import CheckpointError
 from .configuration import TrainConfig
 from .export import ExportError
 from .shards import ShardError
+from .trainer import TrainingError
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -16,7 +17,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         options.run_command(options)
-    except (ShardError, CheckpointError, ExportError, FileNotFoundError, ValueError) as error:
+    except (ShardError, CheckpointError, ExportError, FileNotFoundError, TrainingError, ValueError) as error:
         print(f"accurate_training: {error}", file=sys.stderr)
         return 2
     return 0

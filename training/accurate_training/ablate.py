@@ -14,7 +14,7 @@ from .losses import LossParams
 from .metrics import MaskScores
 from .network import build_network
 from .predict import THRESHOLD, wire_probability
-from .trainer import CHECKPOINT, Trainer
+from .trainer import CHECKPOINT, Trainer, TrainingError
 
 #: Cross entropy stays in every arm; nnU-Net's default loss (cross entropy + Dice) is the ground line.
 ARMS: dict[str, LossParams] = {
@@ -46,7 +46,9 @@ def run_ablation(
     for name in arms:
         config = ablation_config(ARMS[name], width=width, steps=steps, crop_px=crop_px)
         run = folder / folder_name(name)
-        Trainer(config, shards=shards, run=run).train()
+        reached = Trainer(config, shards=shards, run=run).train()
+        if reached < steps:
+            raise TrainingError(f"{run}: stopped at step {reached} of {steps}; the same command goes on")
         results[name] = score_method(checkpoint_segmenter(run / CHECKPOINT), images, masks)
     return results
 

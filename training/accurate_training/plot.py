@@ -44,7 +44,7 @@ def plot_runs(runs: list[Path], picture: Path) -> None:
                 scores.plot(x, y, marker=".", label=label if number == 0 else None)
         offset += steps[-1]["step"] + 1
     losses.set(ylabel=f"training loss (mean of {SMOOTHING} steps)", yscale="log")
-    scores.set(ylabel="validation images", ylim=(0.6, 1.0))
+    scores.set(ylabel="validation images", ylim=(0.0, 1.0))
     rates.set(ylabel="learning rate", xlabel="step")
     for axes in (losses, scores):
         axes.legend()
