@@ -222,8 +222,26 @@ impl Extra {
 }
 
 #[derive(Debug, Args)]
-#[command(after_help = families_help())]
+#[command(
+    after_help = families_help(),
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true
+)]
 pub struct SynthArgs {
+    #[command(subcommand)]
+    pub images: Option<SynthCommand>,
+    #[command(flatten)]
+    pub cases: Option<CasesArgs>,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum SynthCommand {
+    /// Single labelled X-ray images, randomised, for training and testing a segmentation.
+    Xray(XrayArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct CasesArgs {
     /// The family of curves.
     pub family: Family,
     /// How many cases.
@@ -246,6 +264,33 @@ pub struct SynthArgs {
     pub xray: bool,
     #[command(flatten)]
     pub disturbances: Disturbances,
+}
+
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("output").required(true).multiple(true).args(["shards", "sheet"]))]
+pub struct XrayArgs {
+    /// Folder for shard-000000.npy, ... (uint8, n x 3 x H x W: image, mask, tube) and shards.json;
+    /// shards that are there are kept.
+    #[arg(long, value_name = "DIR")]
+    pub shards: Option<PathBuf>,
+    /// A contact sheet (PNG): every image beside itself with its label.
+    #[arg(long, value_name = "PNG")]
+    pub sheet: Option<PathBuf>,
+    /// How many images.
+    #[arg(short = 'n', long, default_value_t = 24, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    pub count: u64,
+    /// Index of the first image; the image of an index is the same whatever else is generated.
+    #[arg(long, default_value_t = 0, value_name = "INDEX")]
+    pub first: u64,
+    /// Seed of the set: 2000 to train, 1500 to validate, 1 to 999 to evaluate.
+    #[arg(short, long, default_value_t = 0)]
+    pub seed: u64,
+    /// Width and height of an image, px.
+    #[arg(long, default_value_t = 512, value_name = "PX")]
+    pub size: u32,
+    /// Images per shard.
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=4096))]
+    pub per_shard: u64,
 }
 
 /// The two kinds of ordered points a generated case has.

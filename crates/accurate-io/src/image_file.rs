@@ -147,6 +147,16 @@ pub fn png_bytes(image: &Array2<u8>) -> Result<Vec<u8>, IoError> {
     encode_png(path, size, image.iter().copied().collect::<Vec<u8>>(), DynamicImage::ImageLuma8)
 }
 
+/// Writes an 8-bit colour PNG, shape `(height, width)` of `[red, green, blue]`.
+///
+/// # Errors
+/// As [`write_mask`].
+pub fn write_rgb(path: &Path, image: &Array2<[u8; 3]>) -> Result<(), IoError> {
+    let size = size_of(path, image.dim())?;
+    let channels = image.iter().flatten().copied().collect::<Vec<u8>>();
+    write_png(path, size, channels, DynamicImage::ImageRgb8)
+}
+
 /// Writes a 16-bit grey PNG, shape `(height, width)`.
 ///
 /// # Errors
@@ -271,30 +281,22 @@ fn size_of(path: &Path, (height, width): (usize, usize)) -> Result<(u32, u32), I
     Ok((side("image width in px", width)?, side("image height in px", height)?))
 }
 
-fn write_png<T>(
+fn write_png<P: image::Pixel>(
     path: &Path,
     size: (u32, u32),
-    values: Vec<T>,
-    wrap: impl FnOnce(ImageBuffer<Luma<T>, Vec<T>>) -> DynamicImage,
-) -> Result<(), IoError>
-where
-    Luma<T>: image::Pixel<Subpixel = T>,
-    T: image::Primitive,
-{
+    values: Vec<P::Subpixel>,
+    wrap: impl FnOnce(ImageBuffer<P, Vec<P::Subpixel>>) -> DynamicImage,
+) -> Result<(), IoError> {
     let png = encode_png(path, size, values, wrap)?;
     write_atomically(path, |w| w.write_all(&png))
 }
 
-fn encode_png<T>(
+fn encode_png<P: image::Pixel>(
     path: &Path,
     (width, height): (u32, u32),
-    values: Vec<T>,
-    wrap: impl FnOnce(ImageBuffer<Luma<T>, Vec<T>>) -> DynamicImage,
-) -> Result<Vec<u8>, IoError>
-where
-    Luma<T>: image::Pixel<Subpixel = T>,
-    T: image::Primitive,
-{
+    values: Vec<P::Subpixel>,
+    wrap: impl FnOnce(ImageBuffer<P, Vec<P::Subpixel>>) -> DynamicImage,
+) -> Result<Vec<u8>, IoError> {
     let buffer = ImageBuffer::from_raw(width, height, values)
         .ok_or_else(|| IoError::Empty { path: path.to_owned(), what: "pixels" })?;
     let mut png = Cursor::new(Vec::new());

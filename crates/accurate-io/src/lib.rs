@@ -52,12 +52,13 @@ pub use find::find_pairs;
 pub use fingerprint::{hash_bytes, hash_file, hash_pair};
 pub use image_file::{
     BitDepth, GreyImage, MAX_IMAGE_SIDE_PX, png_bytes, read_grey, read_image_size, read_mask,
-    write_grey, write_mask, write_u8, write_u16,
+    write_grey, write_mask, write_rgb, write_u8, write_u16,
 };
 pub use json::write_json;
 pub use manifest::{Generator, Manifest, ManifestFile, Split, read_manifest, read_manifests};
 pub use matrix::{read_matrix3, read_matrix3x4, write_matrix3, write_matrix3x4};
 pub use nifti_label::write_mask_nifti;
+pub use npy::write_npy_u8;
 pub use pair::{OrderedPoints, Pair, PairParts, Truth, read_pair};
 pub use pair_write::{PairContents, write_pair};
 pub use ply::{PlyEncoding, read_ply_points, write_ply_points};

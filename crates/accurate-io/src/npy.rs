@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use accurate_geom::{LengthUnit, Point3};
-use ndarray::Array2;
+use ndarray::{Array2, Array4};
 use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
 
@@ -64,6 +64,14 @@ pub(crate) fn write(path: &Path, curve: &CurveTable) -> Result<(), IoError> {
     let mut bytes = Vec::new();
     array.write_npy(&mut bytes).map_err(|e| failed(e.to_string()))?;
     write_atomically(path, |w| w.write_all(&bytes))
+}
+
+/// Writes bytes of shape (images, channels, height, width) as NPY `|u1`, C order.
+///
+/// # Errors
+/// [`IoError::System`].
+pub fn write_npy_u8(path: &Path, array: &Array4<u8>) -> Result<(), IoError> {
+    write_atomically(path, |w| array.write_npy(w).map_err(std::io::Error::other))
 }
 
 /// Refuses a header the parser should not see, and returns the number of bytes behind it.
@@ -137,6 +145,20 @@ mod tests {
         assert!(error.to_string().contains("nest deeper"), "{error}");
         let error = read_raw(&"(".repeat(60_000), &[]).unwrap_err();
         assert!(error.to_string().contains("at most 4096"), "{error}");
+    }
+
+    #[test]
+    fn bytes_are_written_as_numpy_reads_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("images.npy");
+        let array =
+            Array4::from_shape_fn((2, 3, 4, 5), |(n, c, y, x)| (60 * n + 20 * c + 5 * y + x) as u8);
+        write_npy_u8(&path, &array).unwrap();
+        let bytes = fs::read(&path).unwrap();
+        let header = String::from_utf8_lossy(&bytes[..bytes.len() - 120]).into_owned();
+        assert!(header.contains("'|u1'") && header.contains("(2, 3, 4, 5)"), "{header}");
+        assert!(header.contains("'fortran_order': False"), "{header}");
+        assert!(bytes[bytes.len() - 120..].iter().copied().eq(0..120));
     }
 
     #[test]

@@ -36,6 +36,11 @@ impl Background {
         Self { grid }
     }
 
+    /// The grid itself, two pixels a cell.
+    pub fn into_grid(self) -> Array2<f64> {
+        self.grid
+    }
+
     /// Bilinear, at full resolution; shape (height, width).
     pub fn upsampled(&self, size: ImageSize) -> Array2<f64> {
         let cell = CELL_PX as f64;
@@ -46,7 +51,7 @@ impl Background {
 }
 
 /// Value of a grid (2 x 2 or larger) between its nodes; past its last nodes it goes on linearly.
-fn bilinear(grid: &Array2<f64>, x: f64, y: f64) -> f64 {
+pub(crate) fn bilinear(grid: &Array2<f64>, x: f64, y: f64) -> f64 {
     let column = (x as usize).min(grid.ncols() - 2);
     let row = (y as usize).min(grid.nrows() - 2);
     let (u, v) = (x - column as f64, y - row as f64);

@@ -43,6 +43,14 @@ pub enum SynthError {
         /// Length of the projected curve, px.
         length_px: f64,
     },
+    /// An image could not be encoded or decoded.
+    #[error("{what}: {reason}")]
+    Encoding {
+        /// The format.
+        what: &'static str,
+        /// What the codec said.
+        reason: String,
+    },
     /// A camera or a projection was refused.
     #[error(transparent)]
     Geometry(#[from] GeomError),

@@ -20,6 +20,7 @@
 mod background;
 mod case;
 mod damage;
+mod domain;
 mod error;
 mod family;
 mod mask;
@@ -36,6 +37,7 @@ mod xray;
 
 pub use case::{SynthCase, TRUTH_POINTS, generate};
 pub use damage::Disc;
+pub use domain::{TUBE_RADIUS_PX, VisiblePiece, XRAY_VERSION, XrayDomain, XraySample, draw_xray};
 pub use error::SynthError;
 pub use family::{Family, UnknownFamily};
 pub use options::{CalibrationError, CaseOptions};

@@ -9,8 +9,13 @@ use crate::Family;
 /// and different streams never share a key, and a stream depends on nothing but its name: not on
 /// the order of generation, the machine or the number of threads.
 pub fn case_rng(family: Family, seed: u64, index: u64, stream: &str) -> ChaCha8Rng {
+    named_rng(family.name(), seed, index, stream)
+}
+
+/// The stream `stream` of member `index` of the set `(name, seed)`; see [`case_rng`].
+pub(crate) fn named_rng(name: &str, seed: u64, index: u64, stream: &str) -> ChaCha8Rng {
     let mut key = [0; 32];
-    let words = [seed, index, fnv1a(family.name()), fnv1a(stream)];
+    let words = [seed, index, fnv1a(name), fnv1a(stream)];
     for (bytes, word) in key.chunks_exact_mut(8).zip(words) {
         bytes.copy_from_slice(&word.to_le_bytes());
     }

@@ -188,7 +188,7 @@ fn obliquity(centre: &Point3, from: &Point3, to: &Point3) -> f64 {
 
 /// Chord of a circle of radius `r` at distance `d` from its centre, averaged over one pixel across
 /// the wire, in diameters: thin wires keep their mass whatever their position between pixels.
-fn mean_chord(d: f64, r: f64) -> f64 {
+pub(crate) fn mean_chord(d: f64, r: f64) -> f64 {
     // Antiderivative of the chord 2 sqrt(r² - x²), clamped to the circle.
     let area = |x: f64| {
         let x = x.clamp(-r, r);
@@ -245,7 +245,7 @@ fn cover(depth: &mut Array2<f64>, disc: &Disc) {
 }
 
 /// Gaussian blur in place, separable, cut at 4 sigma; the border value continues outside.
-fn blur(image: &mut Array2<f64>, sigma_px: f64) {
+pub(crate) fn blur(image: &mut Array2<f64>, sigma_px: f64) {
     if sigma_px <= 0.0 {
         return;
     }

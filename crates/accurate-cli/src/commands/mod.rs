@@ -10,6 +10,7 @@ mod synth;
 mod table;
 mod trace;
 mod verify;
+mod xray;
 
 use crate::args::{Cli, Command};
 use crate::console::Console;

@@ -4,12 +4,22 @@ use accurate3d::synth::{
 };
 use rayon::prelude::*;
 
-use crate::args::{Disturbances, PointsKind, SynthArgs};
+use super::xray;
+use crate::args::{CasesArgs, Disturbances, PointsKind, SynthArgs, SynthCommand};
 use crate::console::Console;
 use crate::failure::Failure;
 
-/// `accurate synth`: one pair folder a case.
+/// `accurate synth`: pair folders of a family, or single X-ray images.
 pub fn run(args: &SynthArgs, console: &Console) -> Result<(), Failure> {
+    match (&args.images, &args.cases) {
+        (Some(SynthCommand::Xray(xray)), _) => xray::run(xray, console),
+        (None, Some(cases)) => generate_cases(cases, console),
+        (None, None) => Err(Failure::new(Failure::USAGE, "a family or `xray` is missing")),
+    }
+}
+
+/// One pair folder a case.
+fn generate_cases(args: &CasesArgs, console: &Console) -> Result<(), Failure> {
     let options = case_options(&args.disturbances);
     let bar = console.progress(args.count as usize, "generating");
     let last = args
