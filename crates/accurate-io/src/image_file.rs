@@ -4,7 +4,6 @@ use std::path::Path;
 use accurate_geom::ImageSize;
 use image::{
     DynamicImage, GenericImageView, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits,
-    Luma,
 };
 use ndarray::Array2;
 
@@ -313,7 +312,7 @@ fn to_array<T>(path: &Path, shape: (usize, usize), values: Vec<T>) -> Result<Arr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{Rgb, RgbImage, RgbaImage};
+    use image::{Luma, Rgb, RgbImage, RgbaImage};
     use std::fs;
 
     fn save(image: &DynamicImage, format: ImageFormat) -> (tempfile::TempDir, std::path::PathBuf) {

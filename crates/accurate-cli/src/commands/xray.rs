@@ -4,7 +4,7 @@ use std::path::Path;
 use accurate3d::io::{remove_unfinished, write_json, write_npy_u8, write_rgb};
 use accurate3d::synth::{SynthError, XRAY_VERSION, XrayDomain, XraySample, draw_xray};
 use indicatif::ProgressBar;
-use ndarray::{Array2, Array4, s};
+use ndarray::{Array2, Array4, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -154,10 +154,10 @@ fn pack(
         .map(|index| draw(index).inspect(|_| bar.inc(1)))
         .collect::<Result<_, _>>()?;
     let mut array = Array4::zeros((samples.len(), 3, side, side));
-    for (k, sample) in samples.iter().enumerate() {
-        array.slice_mut(s![k, 0, .., ..]).assign(&sample.image);
-        array.slice_mut(s![k, 1, .., ..]).assign(&sample.mask.mapv(u8::from));
-        array.slice_mut(s![k, 2, .., ..]).assign(&sample.tube.mapv(u8::from));
+    for (mut channels, sample) in array.outer_iter_mut().zip(&samples) {
+        channels.index_axis_mut(Axis(0), 0).assign(&sample.image);
+        channels.index_axis_mut(Axis(0), 1).assign(&sample.mask.mapv(u8::from));
+        channels.index_axis_mut(Axis(0), 2).assign(&sample.tube.mapv(u8::from));
     }
     Ok(array)
 }
