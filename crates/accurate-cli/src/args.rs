@@ -276,6 +276,13 @@ pub struct XrayArgs {
     /// A contact sheet (PNG): every image beside itself with its label.
     #[arg(long, value_name = "PNG")]
     pub sheet: Option<PathBuf>,
+    /// Which generator draws: `held-out` shares no model with `training` and is for evaluation.
+    #[arg(long, value_enum, default_value_t = XrayGenerator::Training)]
+    pub generator: XrayGenerator,
+    /// Draw wires onto these grey images instead (evaluation): image i onto file i modulo their
+    /// number, a square of --size from its middle.
+    #[arg(long, value_name = "IMAGE", num_args = 1.., conflicts_with = "generator")]
+    pub onto: Vec<PathBuf>,
     /// How many images.
     #[arg(short = 'n', long, default_value_t = 24, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub count: u64,
@@ -291,6 +298,15 @@ pub struct XrayArgs {
     /// Images per shard.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=4096))]
     pub per_shard: u64,
+}
+
+/// What draws single X-ray images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum XrayGenerator {
+    /// The randomised domain that networks are trained on.
+    Training,
+    /// Another background, wire, blur and noise.
+    HeldOut,
 }
 
 /// The two kinds of ordered points a generated case has.

@@ -73,6 +73,16 @@ pub enum EvalError {
         /// The length of the other list.
         expected: usize,
     },
+    /// Two images that belong together have different shapes.
+    #[error("{which}: shape {found:?}, expected {expected:?} (rows, columns)")]
+    ShapeMismatch {
+        /// The image.
+        which: &'static str,
+        /// Its shape.
+        found: (usize, usize),
+        /// The shape of the other image.
+        expected: (usize, usize),
+    },
     /// The points lie on one line (or in one point): a rotation about it cannot be seen.
     #[error(
         "the points do not fix a rotation: relative spread off a line {spread_ratio:.1e}, needed {needed:.0e}"

@@ -2,6 +2,8 @@
 //!
 //! - [`table_scores`]: the four columns of the paper's table, between point sets.
 //! - [`curve_scores`], [`reprojection_rms`]: between curves, whatever their sampling.
+//! - [`dice`], [`cl_dice`], [`skeleton_agreement`], [`betti_0_error`], [`centreline_distance`]: of a
+//!   segmentation, from masks and the caller's skeletons.
 //! - [`summarise`], [`bootstrap_mean`], [`fraction_below`]: over the cases of a set, failures
 //!   counted, never averaged away.
 //! - [`align_similarity`]: for methods that know neither scale nor pose.
@@ -22,11 +24,13 @@
 //! # Ok::<(), accurate_eval::EvalError>(())
 //! ```
 
+mod centreline;
 mod check;
 mod curve_scores;
 mod error;
 mod frechet;
 mod interval;
+mod mask_scores;
 mod nearest;
 mod published;
 mod quantile;
@@ -36,10 +40,14 @@ mod scores;
 mod summary;
 mod umeyama;
 
+pub use centreline::{CentrelineDistance, centreline_distance};
 pub use curve_scores::{CurveScores, curve_scores};
 pub use error::EvalError;
 pub use frechet::discrete_frechet;
 pub use interval::{DEFAULT_RESAMPLES, MeanInterval, bootstrap_mean};
+pub use mask_scores::{
+    SkeletonAgreement, betti_0, betti_0_error, cl_dice, dice, skeleton_agreement, soft_dice,
+};
 pub use published::{
     Dataset, Metric, PUBLISHED_ROWS, PublishedCell, PublishedInput, PublishedRow, published,
     published_cells, published_table,

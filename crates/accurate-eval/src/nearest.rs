@@ -25,10 +25,17 @@ pub(crate) struct PolylineIndex<const N: usize> {
 impl<const N: usize> PolylineIndex<N> {
     /// The polyline through `vertices`, which are finite and at least one; one vertex is a point.
     pub(crate) fn new(vertices: &[[f64; N]]) -> Self {
-        let mut segments: Vec<_> =
-            vertices.windows(2).map(|pair| Segment { from: pair[0], to: pair[1] }).collect();
-        if let [only] = vertices {
-            segments.push(Segment { from: *only, to: *only });
+        Self::of_pieces(std::iter::once(vertices))
+    }
+
+    /// All of several polylines.
+    pub(crate) fn of_pieces<'a>(pieces: impl Iterator<Item = &'a [[f64; N]]>) -> Self {
+        let mut segments = Vec::new();
+        for vertices in pieces {
+            segments.extend(vertices.windows(2).map(|pair| Segment { from: pair[0], to: pair[1] }));
+            if let [only] = vertices {
+                segments.push(Segment { from: *only, to: *only });
+            }
         }
         Self { pieces: Pieces::new(segments) }
     }

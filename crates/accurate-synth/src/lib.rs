@@ -37,7 +37,10 @@ mod xray;
 
 pub use case::{SynthCase, TRUTH_POINTS, generate};
 pub use damage::Disc;
-pub use domain::{TUBE_RADIUS_PX, VisiblePiece, XRAY_VERSION, XrayDomain, XraySample, draw_xray};
+pub use domain::{
+    TUBE_RADIUS_PX, VisiblePiece, XRAY_VERSION, XrayDomain, XraySample, draw_xray,
+    draw_xray_held_out, draw_xray_onto,
+};
 pub use error::SynthError;
 pub use family::{Family, UnknownFamily};
 pub use options::{CalibrationError, CaseOptions};

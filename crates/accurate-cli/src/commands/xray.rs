@@ -1,14 +1,18 @@
 use std::fs;
 use std::path::Path;
 
-use accurate3d::io::{remove_unfinished, write_json, write_npy_u8, write_rgb};
-use accurate3d::synth::{SynthError, XRAY_VERSION, XrayDomain, XraySample, draw_xray};
+use accurate3d::io::{
+    hash_file, read_grey, remove_unfinished, write_json, write_npy_u8, write_rgb,
+};
+use accurate3d::synth::{
+    SynthError, XRAY_VERSION, XrayDomain, XraySample, draw_xray, draw_xray_held_out, draw_xray_onto,
+};
 use indicatif::ProgressBar;
 use ndarray::{Array2, Array4, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::args::XrayArgs;
+use crate::args::{XrayArgs, XrayGenerator};
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -26,7 +30,15 @@ pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
     if args.first.checked_add(args.count).is_none() {
         return Err(Failure::new(Failure::USAGE, "--first plus --count is too large"));
     }
-    let draw = |index| draw_xray(&domain, args.seed, index);
+    let backgrounds: Vec<_> =
+        args.onto.iter().map(|path| middle_of(path, args.size)).collect::<Result<_, _>>()?;
+    let draw = |index: u64| match (args.generator, backgrounds.len() as u64) {
+        (XrayGenerator::Training, 0) => draw_xray(&domain, args.seed, index),
+        (XrayGenerator::HeldOut, _) => draw_xray_held_out(args.size, args.seed, index),
+        (XrayGenerator::Training, files) => {
+            draw_xray_onto(&domain, &backgrounds[(index % files) as usize], args.seed, index)
+        }
+    };
     if let Some(folder) = &args.shards {
         write_shards(folder, args, &draw, console)?;
     }
@@ -42,6 +54,34 @@ pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
         console.remark(&format!("{} images in {}", args.count, path.display()));
     }
     Ok(())
+}
+
+/// The square of `side` px in the middle of a grey image, as eight bits.
+fn middle_of(path: &Path, side: u32) -> Result<Array2<u8>, Failure> {
+    let image = read_grey(path)?;
+    let ((height, width), side) = (image.values.dim(), side as usize);
+    if height < side || width < side {
+        let message = format!("{}: {width} x {height} px, less than {side}", path.display());
+        return Err(Failure::new(Failure::BAD_INPUT, message).with_hint("give a smaller --size"));
+    }
+    let (top, left) = ((height - side) / 2, (width - side) / 2);
+    let scale = 255.0 / image.depth.max_value();
+    Ok(Array2::from_shape_fn((side, side), |(row, column)| {
+        (image.values[[top + row, left + column]] * scale).round() as u8
+    }))
+}
+
+/// The generator's name in a list of shards. Images that wires are drawn onto are named by their
+/// hashes, so that a folder never mixes them.
+fn generator_name(args: &XrayArgs) -> Result<String, Failure> {
+    if args.onto.is_empty() {
+        return Ok(match args.generator {
+            XrayGenerator::Training => "xray".to_owned(),
+            XrayGenerator::HeldOut => "xray-held-out".to_owned(),
+        });
+    }
+    let hashes: Vec<_> = args.onto.iter().map(|p| hash_file(p)).collect::<Result<_, _>>()?;
+    Ok(format!("xray-onto {}", hashes.join(" ")))
 }
 
 /// What a folder of shards holds, and what made it.
@@ -79,7 +119,7 @@ fn write_shards(
         .map_err(|e| Failure::new(Failure::IO, format!("{}: create: {e}", folder.display())))?;
     remove_unfinished(folder)?;
     let mut list = ShardList {
-        generator: "xray".to_owned(),
+        generator: generator_name(args)?,
         version: XRAY_VERSION,
         seed: args.seed,
         first: args.first,

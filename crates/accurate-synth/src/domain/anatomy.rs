@@ -119,7 +119,7 @@ fn add_gas(rng: &mut ChaCha8Rng, depth: &mut Array2<f64>) {
             let (a, b) = (rng.random_range(0.02..0.12) * side, rng.random_range(0.02..0.12) * side);
             let strength = rng.random_range(0.05..0.35);
             let soft = rng.random_range(0.05..0.3);
-            let (cos, sin) = (rng.random_range(0.0..TAU) as f64).sin_cos();
+            let (sin, cos) = f64::sin_cos(rng.random_range(0.0..TAU));
             for ((row, column), value) in depth.indexed_iter_mut() {
                 let (dx, dy) = (column as f64 - x, row as f64 - y);
                 let (u, v) = ((cos * dx + sin * dy) / a, (cos * dy - sin * dx) / b);
@@ -133,13 +133,15 @@ fn add_gas(rng: &mut ChaCha8Rng, depth: &mut Array2<f64>) {
     }
 }
 
-/// Contrast-filled vessels: tapering, branching, soft; fainter where thinner.
+/// Contrast-filled vessels: tapering, branching, soft, and much fainter where thinner, so that a
+/// small branch is not a wire.
 fn add_vessel_tree(rng: &mut ChaCha8Rng, depth: &mut Array2<f64>) {
     let side = depth.ncols();
     let per_px = rng.random_range(0.008..0.03);
     let mut layer = Array2::<f64>::zeros(depth.dim());
     let trunk = free_path(rng, side, 0.004);
-    let mut open = vec![(trunk, rng.random_range(5.0..18.0_f64), 0_u32)];
+    let root = rng.random_range(5.0..18.0_f64);
+    let mut open = vec![(trunk, root, 0_u32)];
     while let Some((points, radius, generation)) = open.pop() {
         let length = points.len() as f64 * super::wander::STEP_PX;
         let radius_at = |s: f64| (radius * (1.0 - 0.55 * s / length)).max(1.0);
@@ -149,7 +151,7 @@ fn add_vessel_tree(rng: &mut ChaCha8Rng, depth: &mut Array2<f64>) {
             &Stroke {
                 points: &points,
                 radius_px: &radius_at,
-                depth: &|s| per_px * 2.0 * radius_at(s),
+                depth: &|s| per_px * 2.0 * radius_at(s).powi(2) / root,
                 profile: Profile::Solid,
             },
         );

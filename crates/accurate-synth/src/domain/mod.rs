@@ -3,8 +3,10 @@
 
 mod anatomy;
 mod aperture;
+mod composite;
 mod detector;
 mod device;
+mod held_out;
 mod jpeg;
 mod label;
 mod overlay;
@@ -20,6 +22,8 @@ use ndarray::Array2;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+pub use composite::draw_xray_onto;
+pub use held_out::draw_xray_held_out;
 pub use label::{TUBE_RADIUS_PX, VisiblePiece};
 
 use crate::SynthError;
@@ -103,13 +107,7 @@ impl XrayDomain {
     /// # Errors
     /// [`SynthError::BadOption`].
     pub fn check(&self) -> Result<(), SynthError> {
-        if !(64..=4096).contains(&self.side_px) {
-            return Err(SynthError::BadOption {
-                name: "side_px",
-                value: self.side_px.to_string(),
-                expected: "64 to 4096 px",
-            });
-        }
+        check_side(self.side_px)?;
         span("width_px", &self.width_px, 1.0..=64.0, "low..=high within 1 to 64 px")?;
         span("wire_depth", &self.wire_depth, 0.01..=10.0, "low..=high within 0.01 to 10")?;
         let dose = &self.dose_photons_per_px;
@@ -133,6 +131,17 @@ impl XrayDomain {
         }
         Ok(())
     }
+}
+
+fn check_side(side_px: u32) -> Result<(), SynthError> {
+    if (64..=4096).contains(&side_px) {
+        return Ok(());
+    }
+    Err(SynthError::BadOption {
+        name: "side_px",
+        value: side_px.to_string(),
+        expected: "64 to 4096 px",
+    })
 }
 
 fn span<T: PartialOrd + Debug>(
