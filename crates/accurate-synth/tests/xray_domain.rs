@@ -111,7 +111,6 @@ fn a_wire_can_be_seen_in_its_image() {
 
 #[test]
 fn bad_ranges_are_named() {
-    #[expect(clippy::reversed_empty_ranges)]
     let bad = [
         ("side_px", XrayDomain { side_px: 63, ..small() }),
         ("width_px", XrayDomain { width_px: 0.5..=2.0, ..small() }),

@@ -74,7 +74,9 @@ impl Wander {
         let out = pen.at - centre;
         let excess = (out.norm() / radius - 0.75).clamp(0.0, 0.5) / 0.5;
         let inward = (-out.y).atan2(-out.x) - pen.heading;
-        excess * inward.sin() * 4.0 / radius
+        // A curve that runs straight away turns as hard as one that runs across.
+        let turn = if inward.cos() < 0.0 { 1_f64.copysign(inward.sin()) } else { inward.sin() };
+        excess * turn * 4.0 / radius
     }
 }
 
