@@ -27,7 +27,7 @@ pub struct CentrelineDistance {
 /// [`EvalError::TooLarge`] beyond 1e150.
 ///
 /// # Cost
-/// O((n + m) log(n + m)) in the vertices.
+/// O((n + m) log(n + m)) in the vertices of curves, O(n m) at worst.
 pub fn centreline_distance(
     predicted: &[Vec<Point2>],
     truth: &[Vec<Point2>],

@@ -94,7 +94,7 @@ pub struct SkeletonAgreement {
 /// or not finite; [`EvalError::Empty`] for a skeleton without a pixel.
 ///
 /// # Cost
-/// O(n log n) in the pixels of the skeletons.
+/// About O(n log n) in the pixels of thin skeletons, O(n²) at worst.
 pub fn skeleton_agreement(
     predicted_skeleton: ArrayView2<bool>,
     truth_skeleton: ArrayView2<bool>,
