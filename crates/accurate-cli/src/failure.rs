@@ -1,4 +1,5 @@
 use std::fmt;
+use std::path::Path;
 use std::process::ExitCode;
 
 use accurate3d::Error;
@@ -9,6 +10,7 @@ use accurate3d::synth::SynthError;
 use accurate3d::traverse::TraverseError;
 
 use crate::code::Code;
+use crate::segmentation::code_of;
 
 /// What went wrong, what to do about it, and the exit code that says so to a script.
 #[derive(Debug)]
@@ -39,6 +41,12 @@ impl Failure {
     /// The same exit code and hint behind another message.
     pub fn about(self, message: String) -> Self {
         Self { message, ..self }
+    }
+
+    /// The same with the file it is about in front.
+    pub fn of_file(self, path: &Path) -> Self {
+        let message = format!("{}: {}", path.display(), self.message);
+        self.about(message)
     }
 
     pub fn exit_code(&self) -> ExitCode {
@@ -117,11 +125,17 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let message = error.to_string();
         match error {
-            Error::NoNetwork { .. } => Self::new(Self::UNAVAILABLE, message)
-                .with_hint("segment the images elsewhere and use --input mask"),
+            Error::NotSegmented { .. } => Self::new(Self::INTERNAL, message),
             Error::MissingInput { .. } => Self::new(Self::NO_INPUT, message),
-            Error::Segmentation { .. } => Self::new(Code::BadMask, message)
-                .with_hint("look at the mask: the body should be non-zero and at least 2 px long"),
+            Error::Segmentation { source, .. } => {
+                let failure = Self::new(code_of(&source), message);
+                match code_of(&source) {
+                    Code::BadMask => failure.with_hint(
+                        "look at the mask: the body should be non-zero and at least 2 px long",
+                    ),
+                    _ => failure,
+                }
+            }
             Error::Traversal { .. } => Self::new(Code::NoOrder, message)
                 .with_hint("order the points yourself and use --input points"),
             Error::Matching { .. } => Self::new(Code::NoMatch, message)
@@ -150,7 +164,7 @@ impl From<EvalError> for Failure {
 
 impl From<SegError> for Failure {
     fn from(error: SegError) -> Self {
-        Self::new(Code::BadMask, error.to_string())
+        Self::new(code_of(&error), error.to_string())
     }
 }
 

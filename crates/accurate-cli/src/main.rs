@@ -12,6 +12,7 @@ mod commands;
 mod config;
 mod console;
 mod failure;
+mod segmentation;
 mod text;
 
 use std::io::IsTerminal;

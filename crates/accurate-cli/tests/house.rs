@@ -97,6 +97,29 @@ fn the_vocabulary_stays_light() {
 }
 
 #[test]
+fn engines_stay_behind_the_features_of_one_crate() {
+    const ENGINES: [&str; 4] = ["rten", "rten-tensor", "ort", "prost"];
+    for (name, path) in crates() {
+        let text = fs::read_to_string(path.join("Cargo.toml")).unwrap();
+        let table: toml::Table = text.parse().unwrap();
+        let Some(dependencies) = table["dependencies"].as_table() else { continue };
+        for engine in ENGINES {
+            let optional = dependencies.get(engine).map(|d| {
+                d.as_table().and_then(|d| d.get("optional")).and_then(toml::Value::as_bool)
+            });
+            match optional {
+                None => {}
+                Some(optional) => {
+                    assert_eq!((name.as_str(), optional), ("accurate-seg", Some(true)), "{engine}")
+                }
+            }
+        }
+        let default = table.get("features").and_then(|f| f.get("default"));
+        assert!(name != "accurate-seg" || default.is_none(), "accurate-seg is light by default");
+    }
+}
+
+#[test]
 fn folder_and_crate_names_agree() {
     for (name, path) in crates() {
         let text = fs::read_to_string(path.join("Cargo.toml")).unwrap();

@@ -11,6 +11,14 @@ pub(crate) const MAX_POINTS_BYTES: u64 = 256 << 20;
 /// Largest accepted image file, bytes.
 pub(crate) const MAX_IMAGE_BYTES: u64 = 1 << 30;
 
+/// Reads a whole file of at most `limit` bytes, for formats that other crates know.
+///
+/// # Errors
+/// [`IoError::TooLarge`] before taking memory for it, [`IoError::Missing`], [`IoError::System`].
+pub fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
+    read_bytes(path, limit)
+}
+
 /// Reads a whole file, refusing one above `limit` bytes before taking memory for it. Also safe for
 /// a file that grows, or a device that never ends.
 ///

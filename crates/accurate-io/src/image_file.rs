@@ -165,6 +165,18 @@ pub fn write_u16(path: &Path, image: &Array2<u16>) -> Result<(), IoError> {
     write_png(path, size, image.iter().copied().collect::<Vec<u16>>(), DynamicImage::ImageLuma16)
 }
 
+/// Writes an 8-bit colour PNG, red, green and blue per pixel, shape `(height, width)`.
+///
+/// # Errors
+/// As [`write_mask`].
+pub fn write_rgb(path: &Path, image: &Array2<[u8; 3]>) -> Result<(), IoError> {
+    let (width, height) = size_of(path, image.dim())?;
+    let buffer = ImageBuffer::from_raw(width, height, image.iter().flatten().copied().collect())
+        .ok_or_else(|| IoError::Empty { path: path.to_owned(), what: "pixels" })?;
+    let png = encode(path, &DynamicImage::ImageRgb8(buffer))?;
+    write_atomically(path, |w| w.write_all(&png))
+}
+
 /// Writes a grey image as PNG of its depth, values rounded to the nearest integer.
 ///
 /// # Errors
@@ -298,8 +310,12 @@ fn encode_png<P: image::Pixel>(
 ) -> Result<Vec<u8>, IoError> {
     let buffer = ImageBuffer::from_raw(width, height, values)
         .ok_or_else(|| IoError::Empty { path: path.to_owned(), what: "pixels" })?;
+    encode(path, &wrap(buffer))
+}
+
+fn encode(path: &Path, image: &DynamicImage) -> Result<Vec<u8>, IoError> {
     let mut png = Cursor::new(Vec::new());
-    wrap(buffer)
+    image
         .write_to(&mut png, ImageFormat::Png)
         .map_err(|e| IoError::system(path, "encode", std::io::Error::other(e.to_string())))?;
     Ok(png.into_inner())
@@ -337,6 +353,19 @@ mod tests {
         let white = RgbImage::from_pixel(2, 2, Rgb([255, 255, 255]));
         let (_folder, path) = save(&white.into(), ImageFormat::Bmp);
         assert!(read_grey(&path).unwrap().values.iter().all(|&v| v == 255.0));
+    }
+
+    #[test]
+    fn colours_are_read_back_as_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let colours = Array2::from_shape_fn((2, 3), |(y, x)| [(40 * y) as u8, (50 * x) as u8, 7]);
+        write_rgb(&path, &colours).unwrap();
+        let read = image::open(&path).unwrap().into_rgb8();
+        for ((y, x), colour) in colours.indexed_iter() {
+            assert_eq!(read.get_pixel(x as u32, y as u32).0, *colour);
+        }
+        assert!(matches!(write_rgb(&path, &Array2::default((0, 3))), Err(IoError::Empty { .. })));
     }
 
     #[test]

@@ -45,6 +45,7 @@ mod rig_file;
 mod vtp;
 
 pub use atomic::{remove_unfinished, write_atomically};
+pub use bounded::read_file;
 pub use curve::{Column, CurveTable, is_curve_file, read_curve, write_curve};
 pub use distortion::{read_distortion, undistort_points};
 pub use error::IoError;

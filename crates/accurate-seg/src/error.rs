@@ -58,6 +58,22 @@ pub enum SegError {
         /// Which one: `level`, `low` or `high`.
         name: &'static str,
     },
+    /// A threshold of a probability lies outside of 0 to 1.
+    #[error("threshold `{name}` is {value}; expected 0 to 1")]
+    LevelOutOfRange {
+        /// Which one: `low` or `high`.
+        name: &'static str,
+        /// Its value.
+        value: f32,
+    },
+    /// The engine that runs a network failed.
+    #[error("{engine}: {message}")]
+    Engine {
+        /// Which engine.
+        engine: String,
+        /// What it says.
+        message: String,
+    },
     /// The lower threshold of a hysteresis lies above the upper one.
     #[error("hysteresis thresholds out of order: low {low} > high {high}")]
     LevelsOutOfOrder {
@@ -65,6 +81,22 @@ pub enum SegError {
         low: f32,
         /// Upper threshold, in grey values.
         high: f32,
+    },
+    /// The caller ended the work before it was done.
+    #[error("ended by the caller after {done} of {total} parts")]
+    Cancelled {
+        /// Parts that were done.
+        done: usize,
+        /// Parts there were.
+        total: usize,
+    },
+    /// A segmenter answered with an array of another size than the image.
+    #[error("segmentation of {found:?} rows and columns for an image of {expected:?}")]
+    WrongShape {
+        /// Rows and columns of the image, px.
+        expected: (usize, usize),
+        /// Rows and columns of the answer, px.
+        found: (usize, usize),
     },
     /// All pixels are equal, so that no threshold separates two classes.
     #[error("every pixel has the value {value}: no threshold separates two classes")]

@@ -3,6 +3,7 @@
 //! - [`binarise_fixed`], [`binarise_otsu`], [`binarise_hysteresis`]: grey values to a [`Mask`];
 //! - [`keep_largest`], [`remove_smaller_than`], [`Components`]: what belongs together;
 //! - [`zhang_suen`] (as scikit-image's `skeletonize`), [`guo_hall`]: lines one pixel wide;
+//! - [`Segmenter`]: whatever finds the body in an image, with a [`Segmentation`] as its answer;
 //! - [`Skeleton`]: its endpoints, junctions and gaps, and its pixels for the stages that follow;
 //! - [`distance_to_background`], [`median_width_px`]: how thick the wire is.
 //!
@@ -29,7 +30,12 @@ mod components;
 mod distance;
 mod error;
 mod mask;
+#[cfg(feature = "network")]
+pub mod network;
+mod post_processing;
+mod segmentation;
 mod skeleton;
+mod spurs;
 mod thin;
 mod thin_rules;
 mod threshold;
@@ -38,6 +44,8 @@ pub use components::{Components, keep_largest, remove_smaller_than};
 pub use distance::{distance_to_background, median_width_px};
 pub use error::SegError;
 pub use mask::Mask;
+pub use post_processing::PostProcessing;
+pub use segmentation::{Progress, Segmentation, Segmenter, Watch, unwatched};
 pub use skeleton::Skeleton;
 pub use thin::{guo_hall, zhang_suen};
 pub use threshold::{binarise_fixed, binarise_hysteresis, binarise_otsu, otsu_level};

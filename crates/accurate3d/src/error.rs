@@ -47,9 +47,9 @@ pub enum Error {
         /// What was asked for.
         input: InputKind,
     },
-    /// Images need a segmentation network, and none is installed.
-    #[error("case {case}: no segmentation network is installed, so images cannot be read yet")]
-    NoNetwork {
+    /// Images have to be segmented first.
+    #[error("case {case}: the images are not segmented yet")]
+    NotSegmented {
         /// Case id.
         case: String,
     },
@@ -124,7 +124,7 @@ impl Error {
     /// The stage that refused, where it was a stage.
     pub fn stage(&self) -> Option<Stage> {
         match self {
-            Self::Segmentation { .. } | Self::NoNetwork { .. } => Some(Stage::Segmentation),
+            Self::Segmentation { .. } | Self::NotSegmented { .. } => Some(Stage::Segmentation),
             Self::Traversal { .. } => Some(Stage::Traversal),
             Self::Matching { .. } => Some(Stage::Matching),
             Self::Fitting { .. } => Some(Stage::Fitting),

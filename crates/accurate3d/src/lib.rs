@@ -32,6 +32,7 @@ mod reconstruction;
 mod report;
 mod robust;
 mod sampled_curve;
+mod segment;
 pub mod table;
 
 pub use diagnostics::{CalibrationDiagnostics, Diagnostics, OutlineDiagnostics};
@@ -45,6 +46,7 @@ pub use reconstruct::{Params, reconstruct};
 pub use reconstruction::{Reconstruction, Traces};
 pub use report::{Provenance, report_html};
 pub use robust::{RobustParams, Suspicion};
+pub use segment::segment_images;
 
 /// The statement that stands in every report: this is research software.
 pub const NOT_FOR_CLINICAL_USE: &str = "Research software: not for clinical use.";

@@ -19,6 +19,9 @@ pub struct ViewPair {
     pub masks: Option<[Array2<bool>; 2]>,
     /// Grey images of both views, raw values.
     pub images: Option<[Array2<f32>; 2]>,
+    /// Probability of the body in both images, 0 to 1, where they were segmented
+    /// ([`segment_images`](crate::segment_images)); the masks are then what was made of it.
+    pub probabilities: Option<[Array2<f32>; 2]>,
     /// The true curve, in order, in the rig's unit.
     pub truth: Option<Vec<Point3>>,
 }
@@ -31,6 +34,7 @@ impl From<Pair> for ViewPair {
             points: pair.points,
             masks: pair.masks,
             images: pair.images,
+            probabilities: None,
             truth: pair.truth,
         }
     }
@@ -45,6 +49,7 @@ impl From<SynthCase> for ViewPair {
             points: Some(case.rounded_points),
             masks: Some(case.masks),
             images: None,
+            probabilities: None,
             truth: Some(case.truth),
         }
     }

@@ -54,14 +54,20 @@ impl Params {
 
 /// Reconstructs the 3D curve seen in both views of a pair.
 ///
-/// Masks are skeletonised (Zhang-Suen), ordered by GCTT, and matched. Points are matched in their
+/// Images must have been segmented by [`segment_images`](crate::segment_images); from there on they
+/// take the way of masks. Masks are skeletonised (Zhang-Suen), ordered by GCTT, and matched. Points are matched in their
 /// order; if view 2 runs against view 1 it is turned round first, and the diagnostics say so.
 ///
 /// # Errors
 /// [`Error`], which names the case and the stage; never an empty curve, never a NaN.
 pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
+    if params.input == InputKind::Image {
+        require_segmented(pair)?;
+    }
     match (params.method, params.input) {
-        (Method::Accurate, InputKind::Mask) => return joint_choice(pair, params),
+        (Method::Accurate, InputKind::Mask | InputKind::Image) => {
+            return joint_choice(pair, params);
+        }
         (Method::Accurate, InputKind::Points) => return adjusted_points(pair, params),
         _ => {}
     }
@@ -74,7 +80,7 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
                 .map_err(|source| Error::Matching { case: case(), source })?;
             Traces::given(points1.clone(), points2.clone(), reversed)
         }
-        InputKind::Mask => {
+        InputKind::Mask | InputKind::Image => {
             let [mask1, mask2] = pair.masks.as_ref().ok_or_else(missing)?;
             let skeleton1 = skeleton_pixels::<View1>(mask1, &pair.id)?;
             let skeleton2 = skeleton_pixels::<View2>(mask2, &pair.id)?;
@@ -82,10 +88,6 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
             let (trace1, trace2) = trace_pair(&skeleton1, &skeleton2, f, &params.traverse)
                 .map_err(|source| Error::Traversal { case: case(), source })?;
             Traces::traced(trace1, trace2)
-        }
-        InputKind::Image => {
-            pair.images.as_ref().ok_or_else(missing)?;
-            return Err(Error::NoNetwork { case: case() });
         }
     };
     let matched = params
@@ -108,6 +110,14 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
         diagnostics,
         explanation: Explanation::default(),
     })
+}
+
+fn require_segmented(pair: &ViewPair) -> Result<(), Error> {
+    match (&pair.images, &pair.probabilities) {
+        (_, Some(_)) => Ok(()),
+        (Some(_), None) => Err(Error::NotSegmented { case: pair.id.clone() }),
+        (None, None) => Err(Error::MissingInput { case: pair.id.clone(), input: InputKind::Image }),
+    }
 }
 
 /// Our own method on masks.

@@ -3,8 +3,12 @@
 
 use std::path::Path;
 
+use accurate3d::InputKind;
 use accurate3d::eval::published_cells;
 use accurate3d::table::{Outcome, paper_rows, parse_cells};
+
+/// Method and command of a cell that waits for the network.
+const NOT_YET: (&str, &str) = ("", "no segmentation network");
 
 #[test]
 fn every_published_number_is_a_cell() {
@@ -37,6 +41,10 @@ fn a_cell_can_run_exactly_where_its_row_can() {
     for cell in cells {
         let row = rows.iter().find(|r| r.published == Some(cell.row.as_str())).unwrap();
         match row.outcome {
+            // No trained network ships yet: the image rows run with a model of the user's.
+            Outcome::Run(_) if row.input == InputKind::Image => {
+                assert_eq!((cell.method.as_str(), cell.command.as_str()), NOT_YET);
+            }
             Outcome::Run(method) => assert_eq!(cell.method, method.name()),
             Outcome::NotAvailable(reason) => {
                 assert_eq!((cell.method, cell.command), (String::new(), reason.to_owned()))

@@ -59,6 +59,7 @@ fn curve(rig: &Rig, masks: [Array2<bool>; 2]) -> Vec<Point3> {
         points: None,
         masks: Some(masks),
         images: None,
+        probabilities: None,
         truth: None,
     };
     reconstruct(&pair, &Params::new(InputKind::Mask, Method::Accurate)).unwrap().positions()

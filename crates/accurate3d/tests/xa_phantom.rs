@@ -117,6 +117,7 @@ fn branches_of_the_phantom_come_back_near_the_floor_of_their_skeletons() {
                     points: Some(points),
                     masks: None,
                     images: None,
+                    probabilities: None,
                     truth: None,
                 };
                 let curve = reconstruct(&pair, &Params::new(InputKind::Points, method)).unwrap();

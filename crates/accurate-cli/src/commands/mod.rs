@@ -2,9 +2,11 @@ mod demo;
 mod eval;
 mod explain;
 mod figure;
+mod model;
 mod outputs;
 mod reconstruct;
 mod reproduce;
+mod segment;
 mod shell;
 mod synth;
 mod table;
@@ -38,6 +40,8 @@ pub fn run(cli: &Cli, config: &str) -> Result<(), Failure> {
         Command::Table(args) => table::run(args, &console),
         Command::Figure(args) => figure::run(args, &console),
         Command::Trace(args) => trace::run(args, &console),
+        Command::Segment(args) => segment::run(args, &console),
+        Command::Model(command) => model::run(command, &console),
         Command::Demo(args) => demo::run(args, &console),
         Command::Reproduce(args) => reproduce::run(args, &console),
         Command::Verify(args) => verify::run(args, &console),

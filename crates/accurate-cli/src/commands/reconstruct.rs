@@ -3,7 +3,11 @@ use std::path::{Path, PathBuf};
 
 use accurate3d::fit::CalibrationPriors;
 use accurate3d::io::{PairParts, Truth, find_pairs, hash_pair, read_pair};
-use accurate3d::{InputKind, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair, reconstruct};
+use accurate3d::seg::network::NetworkSegmenter;
+use accurate3d::seg::{Segmenter, unwatched};
+use accurate3d::{
+    InputKind, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair, reconstruct, segment_images,
+};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
@@ -12,15 +16,20 @@ use super::outputs::Outputs;
 use crate::args::ReconstructArgs;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::segmentation::segmenter;
 
 /// `accurate reconstruct`: every pair on its own; one that fails does not stop the others.
 pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
     let jobs = jobs(args)?;
+    let segmenter = match args.input {
+        InputKind::Image => Some(segmenter(&args.model, console)?),
+        InputKind::Points | InputKind::Mask => None,
+    };
     let bar = console.progress(jobs.len(), "reconstructing");
     let results: Vec<Result<Done, Failure>> = jobs
         .par_iter()
         .map(|(dir, out)| {
-            let result = one(dir, out, args);
+            let result = one(dir, out, args, segmenter.as_ref());
             bar.inc(1);
             result
         })
@@ -112,7 +121,12 @@ fn jobs(args: &ReconstructArgs) -> Result<Vec<(PathBuf, Outputs)>, Failure> {
     Ok(jobs)
 }
 
-fn one(dir: &Path, out: &Outputs, args: &ReconstructArgs) -> Result<Done, Failure> {
+fn one(
+    dir: &Path,
+    out: &Outputs,
+    args: &ReconstructArgs,
+    segmenter: Option<&NetworkSegmenter>,
+) -> Result<Done, Failure> {
     let parts = PairParts {
         points: args.input == InputKind::Points,
         masks: args.input == InputKind::Mask,
@@ -126,10 +140,17 @@ fn one(dir: &Path, out: &Outputs, args: &ReconstructArgs) -> Result<Done, Failur
         ..parts
     };
     let pair = ViewPair::from(read_pair(dir, shown)?);
+    let pair = match segmenter {
+        Some(segmenter) => segment_images(pair, segmenter, &unwatched)?,
+        None => pair,
+    };
     let mut params = Params::new(args.input, args.method);
     params.robust.calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
     let reconstruction = reconstruct(&pair, &params)?;
-    let result = result_json(dir, parts, &pair, &params, &reconstruction)?;
+    let mut result = result_json(dir, parts, &pair, &params, &reconstruction)?;
+    if let Some(segmenter) = segmenter {
+        result["parameters"]["segmentation"] = Value::from(segmenter.describe());
+    }
     out.write(&pair, &reconstruction, &result)?;
     let doubted = !reconstruction.diagnostics.suspicions.is_empty();
     Ok(Done {

@@ -4,7 +4,7 @@ use std::path::Path;
 use accurate3d::NOT_FOR_CLINICAL_USE;
 use accurate3d::io::{hash_bytes, hash_file, write_json};
 use accurate3d::synth::{CaseOptions, Family};
-use accurate3d::table::{CaseSet, Format, PointsProtocol, ScoreKind, measure, paper_rows, render};
+use accurate3d::table::{CaseSet, Format, Measuring, PointsProtocol, measure, paper_rows, render};
 use serde::{Deserialize, Serialize};
 
 use crate::args::{Experiment, ReproduceArgs};
@@ -81,7 +81,7 @@ pub fn table1(
         };
         data.insert(set.name(), set.fingerprint()?);
         let bar = console.progress(set.len(), name);
-        let table = measure(&set, &paper_rows(), ScoreKind::Table, None, &|| bar.inc(1))?;
+        let table = measure(&set, &paper_rows(), &Measuring::default(), &|| bar.inc(1))?;
         bar.finish_and_clear();
         for format in Format::ALL {
             files.insert(format!("table1-{name}.{}", format.name()), render(&table, format));

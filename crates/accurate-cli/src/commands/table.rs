@@ -2,12 +2,13 @@ use std::path::Path;
 
 use accurate3d::fit::CalibrationPriors;
 use accurate3d::io::{PairParts, Truth, find_pairs, read_pair};
+use accurate3d::seg::Segmenter;
 use accurate3d::synth::Family;
 use accurate3d::table::{
-    CaseSet, Outcome, PointsProtocol, Row, check_case_count, check_cells, grid, measure,
+    CaseSet, Measuring, Outcome, PointsProtocol, Row, check_case_count, check_cells, grid, measure,
     paper_rows, parse_cells, render,
 };
-use accurate3d::{NOT_FOR_CLINICAL_USE, ViewPair};
+use accurate3d::{InputKind, NOT_FOR_CLINICAL_USE, ViewPair};
 use comfy_table::Table as TerminalTable;
 
 use super::synth::case_options;
@@ -15,6 +16,7 @@ use crate::args::{PointsKind, TableArgs};
 use crate::code::Code;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::segmentation::segmenter;
 use crate::text::{read_text, write_text};
 
 /// `accurate table`: the paper's table on a set, or the check of its cells.
@@ -35,8 +37,19 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
         ));
     }
     let calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
+    let segmenter = match rows.iter().any(|row| row.input == InputKind::Image)
+        && args.input.contains(&InputKind::Image)
+    {
+        true => Some(segmenter(&args.model, console)?),
+        false => None,
+    };
+    let how = Measuring {
+        scores: args.scores,
+        calibration,
+        segmenter: segmenter.as_ref().map(|s| s as &dyn Segmenter),
+    };
     let bar = console.progress(set.len(), "measuring");
-    let table = measure(&set, &rows, args.scores, calibration, &|| bar.inc(1))?;
+    let table = measure(&set, &rows, &how, &|| bar.inc(1))?;
     bar.finish_and_clear();
     let format = if console.json { Some(accurate3d::table::Format::Json) } else { args.format };
     let text = match format {
@@ -67,7 +80,10 @@ fn wanted(row: &Row, args: &TableArgs) -> bool {
         Outcome::Run(method) => args.method.is_empty() || args.method.contains(&method),
         Outcome::NotAvailable(_) => args.method.is_empty(),
     };
-    method && (args.input.is_empty() || args.input.contains(&row.input))
+    // Image rows take minutes: they run only when they are asked for.
+    let unasked =
+        args.input.is_empty() && (row.input != InputKind::Image || args.method.is_empty());
+    method && (unasked || args.input.contains(&row.input))
 }
 
 fn case_set(args: &TableArgs) -> Result<CaseSet, Failure> {
@@ -92,7 +108,7 @@ fn case_set(args: &TableArgs) -> Result<CaseSet, Failure> {
             let parts = PairParts {
                 points: path_has(path, "points"),
                 masks: path_has(path, "masks"),
-                images: false,
+                images: args.input.contains(&InputKind::Image) && path_has(path, "images"),
                 truth: Truth::Required,
             };
             let pairs = find_pairs(path)?
@@ -114,7 +130,7 @@ fn check(path: &Path, console: &Console) -> Result<(), Failure> {
         Failure::new(Failure::BAD_INPUT, format!("{}: {problem}", path.display()))
     })?;
     let bar = console.progress(check_case_count(&cells), "measuring");
-    let checks = check_cells(&cells, &|| bar.inc(1))?;
+    let checks = check_cells(&cells, None, &|| bar.inc(1))?;
     bar.finish_and_clear();
     if console.json {
         console.json(&checks)?;

@@ -4,11 +4,13 @@ use accurate_eval::{
 };
 use accurate_fit::CalibrationPriors;
 use accurate_geom::{LengthUnit, Point3, Rig};
-use accurate_synth::{CaseOptions, Family, generate};
+use accurate_seg::{Segmenter, unwatched};
+use accurate_synth::{CaseOptions, Family, XrayOptions, generate, render_xray};
 use rayon::prelude::*;
 
+use super::ScoreKind;
 use super::rows::{Outcome, Row};
-use crate::{Error, Params, ViewPair, reconstruct};
+use crate::{Error, InputKind, Params, ViewPair, reconstruct, segment_images};
 
 /// The cases that a table is measured on.
 #[derive(Debug, Clone)]
@@ -74,18 +76,21 @@ impl CaseSet {
     pub fn fingerprint(&self) -> Result<String, Error> {
         let cases: Vec<String> = (0..self.len())
             .into_par_iter()
-            .map(|index| Ok(accurate_io::hash_bytes(&bytes_of(&self.case(index)?))))
+            .map(|index| Ok(accurate_io::hash_bytes(&bytes_of(&self.case(index, false)?))))
             .collect::<Result<_, Error>>()?;
         Ok(accurate_io::hash_bytes(cases.concat().as_bytes()))
     }
 
-    fn case(&self, index: usize) -> Result<ViewPair, Error> {
+    /// A generated case gets X-ray pictures if it is asked `with_images`.
+    fn case(&self, index: usize, with_images: bool) -> Result<ViewPair, Error> {
         match self {
             Self::Generated { family, options, seeds, cases, points } => {
                 let (seed, index) = (seeds[index / *cases as usize], index as u64 % cases);
                 let case = generate(*family, seed, index, options)?;
                 let exact = (*points == PointsProtocol::Exact).then(|| case.exact_points.clone());
+                let images = with_images.then(|| render_xray(&case, &XrayOptions::default()));
                 let mut pair = ViewPair::from(case);
+                pair.images = images.map(|both| both.map(|image| image.mapv(f32::from)));
                 if exact.is_some() {
                     pair.points = exact;
                 }
@@ -171,10 +176,24 @@ pub struct Table {
 /// Arc length between samples of the point-to-polyline scores, in pixels at the truth's depth.
 const SPACING_PX: f64 = 0.5;
 
+/// How rows are measured.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Measuring<'a> {
+    /// Which distances are shown.
+    pub scores: ScoreKind,
+    /// What `accurate` mode on masks and images may correct view 2 by, if anything.
+    pub calibration: Option<CalibrationPriors>,
+    /// What segments the images; without it the image rows have no figures.
+    pub segmenter: Option<&'a dyn Segmenter>,
+}
+
+/// Why an image row has no figures without a segmenter.
+const NOT_SEGMENTED: &str = "ask for --input image";
+
 /// Measures every row on every case; the same numbers for any number of threads.
 ///
-/// With `calibration`, `accurate` mode on masks may correct view 2 by as much as these priors allow.
-/// `on_case` is called when a case is done.
+/// The images of generated cases are X-ray pictures with the default options; each is segmented
+/// once for all rows. `on_case` is called when a case is done.
 ///
 /// # Errors
 /// [`Error::Synthesis`] if a case cannot be generated, [`Error::Scoring`] if a mean cannot be formed.
@@ -182,23 +201,30 @@ const SPACING_PX: f64 = 0.5;
 pub fn measure(
     set: &CaseSet,
     rows: &[Row],
-    kind: super::ScoreKind,
-    calibration: Option<CalibrationPriors>,
+    how: &Measuring<'_>,
     on_case: &(dyn Fn() + Sync),
 ) -> Result<Table, Error> {
+    let with_images = runnable(rows, how).any(|(row, _)| row.input == InputKind::Image);
     let per_case: Vec<(LengthUnit, Vec<CaseScore>)> = (0..set.len())
         .into_par_iter()
         .map(|index| {
-            let pair = set.case(index)?;
-            let scores = runnable(rows)
-                .map(|(row, method)| score(&pair, row, method, kind, calibration))
+            let pair = set.case(index, with_images)?;
+            let segmented = how.segmenter.filter(|_| with_images).map(|segmenter| {
+                segment_images(pair.clone(), segmenter, &unwatched).map_err(|e| e.to_string())
+            });
+            let scores = runnable(rows, how)
+                .map(|(row, method)| match (&segmented, row.input) {
+                    (Some(Ok(segmented)), InputKind::Image) => score(segmented, row, method, how),
+                    (Some(Err(reason)), InputKind::Image) => Err((pair.id.clone(), reason.clone())),
+                    _ => score(&pair, row, method, how),
+                })
                 .collect();
             on_case();
             Ok((pair.rig.unit(), scores))
         })
         .collect::<Result<_, Error>>()?;
     let mut measured = Vec::new();
-    for column in 0..runnable(rows).count() {
+    for column in 0..runnable(rows, how).count() {
         let (mut scored, mut failures) = (Vec::new(), Vec::new());
         for (_, scores) in &per_case {
             match &scores[column] {
@@ -214,7 +240,8 @@ pub fn measure(
         .map(|row| TableRow {
             row: row.clone(),
             result: match row.outcome {
-                Outcome::Run(_) => measured.next().ok_or("not measured"),
+                Outcome::Run(_) if runs(row, how) => measured.next().ok_or("not measured"),
+                Outcome::Run(_) => Err(NOT_SEGMENTED),
                 Outcome::NotAvailable(reason) => Err(reason),
             },
         })
@@ -227,29 +254,31 @@ pub fn measure(
     })
 }
 
-fn runnable(rows: &[Row]) -> impl Iterator<Item = (&Row, crate::Method)> {
-    rows.iter().filter_map(|row| match row.outcome {
+fn runnable<'r>(
+    rows: &'r [Row],
+    how: &Measuring<'_>,
+) -> impl Iterator<Item = (&'r Row, crate::Method)> {
+    rows.iter().filter(|row| runs(row, how)).filter_map(|row| match row.outcome {
         Outcome::Run(method) => Some((row, method)),
         Outcome::NotAvailable(_) => None,
     })
 }
 
-fn score(
-    pair: &ViewPair,
-    row: &Row,
-    method: crate::Method,
-    kind: super::ScoreKind,
-    calibration: Option<CalibrationPriors>,
-) -> CaseScore {
+fn runs(row: &Row, how: &Measuring<'_>) -> bool {
+    matches!(row.outcome, Outcome::Run(_))
+        && (row.input != InputKind::Image || how.segmenter.is_some())
+}
+
+fn score(pair: &ViewPair, row: &Row, method: crate::Method, how: &Measuring<'_>) -> CaseScore {
     let fail = |reason: String| (pair.id.clone(), reason);
     let truth = pair.truth.as_deref().ok_or_else(|| fail("the pair has no truth".to_owned()))?;
     let mut params = Params::new(row.input, method);
-    params.robust.calibration = calibration;
+    params.robust.calibration = how.calibration;
     let reconstruction = reconstruct(pair, &params).map_err(|e| fail(e.to_string()))?;
     let curve = reconstruction.positions();
-    let scored = match kind {
-        super::ScoreKind::Table => table_scores(&curve, truth).map(Scored::Table),
-        super::ScoreKind::Polyline => {
+    let scored = match how.scores {
+        ScoreKind::Table => table_scores(&curve, truth).map(Scored::Table),
+        ScoreKind::Polyline => {
             let unit_per_px = world_per_px(&pair.rig, truth);
             curve_scores(&curve, truth, SPACING_PX * unit_per_px)
                 .map(|scores| Scored::Polyline(scores, unit_per_px))

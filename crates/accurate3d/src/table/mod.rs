@@ -7,7 +7,7 @@ mod render;
 mod rows;
 
 pub use cells::{Cell, CellCheck, check_case_count, check_cells, parse_cells};
-pub use measure::{CaseSet, Figure, Measured, PointsProtocol, Table, TableRow, measure};
+pub use measure::{CaseSet, Figure, Measured, Measuring, PointsProtocol, Table, TableRow, measure};
 pub use render::{Format, grid, render};
 pub use rows::{Outcome, Row, paper_rows};
 

@@ -1,0 +1,139 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use accurate3d::NOT_FOR_CLINICAL_USE;
+use accurate3d::io::{read_grey, write_mask, write_rgb, write_u16};
+use accurate3d::seg::network::{NetworkOptions, NetworkSegmenter, Polarity};
+use accurate3d::seg::{
+    Components, Mask, PostProcessing, Segmenter, median_width_px, unwatched, zhang_suen,
+};
+use ndarray::Array2;
+use serde_json::{Value, json};
+
+use crate::args::{Photometric, SegmentArgs};
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::segmentation::segmenter_with;
+use crate::text::make_folder;
+
+/// Part of `--threshold` down to which connected pixels are taken: the default's 0.3 of 0.5.
+const WEAK: f32 = 0.6;
+
+/// `accurate segment`: one image after the other, each on all threads; one that fails does not stop
+/// the others.
+pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
+    let jobs = jobs(args)?;
+    let polarity = match args.photometric {
+        Photometric::Monochrome2 => Polarity::BodyDark,
+        Photometric::Monochrome1 => Polarity::BodyBright,
+    };
+    let segmenter = segmenter_with(&args.model, console, |options, own| NetworkOptions {
+        polarity,
+        postprocessing: args.threshold.map(|high| PostProcessing { low: WEAK * high, high, ..own }),
+        ..options
+    })?;
+    make_folder(&args.out)?;
+    let bar = console.progress(jobs.len(), "segmenting");
+    let (mut failed, mut first_failure) = (0, None);
+    for (image, name) in &jobs {
+        match one(image, name, &args.out, &segmenter) {
+            Ok(report) if console.json => console.json(&report)?,
+            Ok(report) => console.data(&line(&report))?,
+            Err(failure) => {
+                failed += 1;
+                let failure = failure.of_file(image);
+                if jobs.len() > 1 {
+                    console.remark(&failure.to_string());
+                }
+                first_failure.get_or_insert(failure);
+            }
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    console.remark(&format!("{}. {NOT_FOR_CLINICAL_USE}", segmenter.describe()));
+    match first_failure {
+        None => Ok(()),
+        Some(failure) if jobs.len() == 1 => Err(failure),
+        Some(failure) => Err(failure.about(format!("{failed} of {} images failed", jobs.len()))),
+    }
+}
+
+/// Images with the name that their outputs begin with.
+fn jobs(args: &SegmentArgs) -> Result<Vec<(PathBuf, String)>, Failure> {
+    let mut names: BTreeMap<String, &Path> = BTreeMap::new();
+    let mut jobs = Vec::new();
+    for image in &args.images {
+        let stem = image.file_stem().map(|s| s.to_string_lossy().into_owned());
+        let name = stem.ok_or_else(|| {
+            Failure::new(Failure::USAGE, format!("{} names no file", image.display()))
+        })?;
+        if let Some(other) = names.insert(name.clone(), image) {
+            let (a, b) = (other.display(), image.display());
+            return Err(Failure::new(
+                Failure::USAGE,
+                format!("{a} and {b} would both write to {name}_mask.png"),
+            )
+            .with_hint("run them with different --out folders"));
+        }
+        jobs.push((image.clone(), name));
+    }
+    Ok(jobs)
+}
+
+fn one(
+    path: &Path,
+    name: &str,
+    out: &Path,
+    segmenter: &NetworkSegmenter,
+) -> Result<Value, Failure> {
+    let image = read_grey(path)?.values;
+    let found = segmenter.segment(&image, &unwatched)?;
+    let skeleton = zhang_suen(&found.mask);
+    let file = |what: &str| out.join(format!("{name}_{what}.png"));
+    write_mask(&file("mask"), found.mask.as_array())?;
+    // 0 to 1 becomes 0 to 65 535.
+    let sixteen = found.probability.mapv(|p| (p * 65_535.0).round() as u16);
+    write_u16(&file("probability"), &sixteen)?;
+    write_rgb(&file("overlay"), &overlay(&image, &skeleton))?;
+    let pieces = Components::of(&found.mask)?.sizes().len();
+    let width = if found.mask.is_empty() { None } else { Some(median_width_px(&found.mask)?) };
+    let (height, columns) = image.dim();
+    Ok(json!({
+        "image": path.display().to_string(),
+        "size": [columns, height],
+        "body_px": found.mask.count(),
+        "skeleton_px": skeleton.count(),
+        "pieces": pieces,
+        "median_width_px": width,
+        "mask": file("mask").display().to_string(),
+        "probability": file("probability").display().to_string(),
+        "overlay": file("overlay").display().to_string(),
+        "segmentation": segmenter.describe(),
+        "note": NOT_FOR_CLINICAL_USE,
+    }))
+}
+
+fn line(report: &Value) -> String {
+    let width = report["median_width_px"].as_f64().map(|w| format!(", {w:.0} px wide"));
+    format!(
+        "{}: {} skeleton pixels in {} pieces{}",
+        report["image"].as_str().unwrap_or_default(),
+        report["skeleton_px"],
+        report["pieces"],
+        width.unwrap_or_default()
+    )
+}
+
+/// The image in grey from its darkest to its brightest pixel, the skeleton in red.
+fn overlay(image: &Array2<f32>, skeleton: &Mask) -> Array2<[u8; 3]> {
+    let (least, most) = image
+        .iter()
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), &v| (lo.min(v), hi.max(v)));
+    let range = (most - least).max(f32::MIN_POSITIVE);
+    Array2::from_shape_fn(image.dim(), |at| {
+        // Saturates at 255.
+        let grey = ((image[at] - least) / range * 255.0).round() as u8;
+        if skeleton.get(at.0, at.1) { [255, 40, 40] } else { [grey; 3] }
+    })
+}
