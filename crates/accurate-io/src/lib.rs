@@ -6,6 +6,9 @@
 //! - [`read_curve`], [`write_curve`]: 3D curves as CSV, PLY, VTK PolyData, Slicer Markups,
 //!   NPY, NPZ or (feature `parquet`) Parquet.
 //! - [`write_mask_nifti`]: a mask as a NIfTI label map.
+//! - [`read_cameras`], [`write_cameras`]: cameras of other tools, and of DICOM XA with the feature
+//!   `dicom`.
+//! - [`read_curve`], [`write_curve`]: 3D curves as CSV, PLY, VTK PolyData or NPY.
 //! - [`read_grey`], [`read_mask`] and their writers: images as arrays `[[y, x]]`.
 //! - [`read_manifest`]: what a data set is, where it comes from and under which licence.
 //!
@@ -19,8 +22,11 @@
 mod atomic;
 mod bounded;
 mod calibration;
+mod cameras;
 mod curve;
 mod curve_csv;
+#[cfg(feature = "dicom")]
+mod dicom;
 mod distortion;
 mod error;
 mod find;
@@ -47,6 +53,12 @@ mod vtp;
 pub use atomic::{remove_unfinished, write_atomically};
 pub use bounded::read_file;
 pub use curve::{Column, CurveTable, is_curve_file, read_curve, write_curve};
+pub use cameras::{
+    CameraFormat, CameraSource, NamedView, ViewDefaults, is_dicom, read_cameras, write_cameras,
+};
+pub use curve::{Column, CurveTable, read_curve, write_curve};
+#[cfg(feature = "dicom")]
+pub use dicom::{DicomPixels, FrameChoice, read_dicom_pixels, read_dicom_view};
 pub use distortion::{read_distortion, undistort_points};
 pub use error::IoError;
 pub use find::find_pairs;

@@ -75,7 +75,7 @@ pub fn write_npy_u8(path: &Path, array: &Array4<u8>) -> Result<(), IoError> {
 }
 
 /// Refuses a header the parser should not see, and returns the number of bytes behind it.
-fn check_header(bytes: &[u8]) -> Result<usize, String> {
+pub(crate) fn check_header(bytes: &[u8]) -> Result<usize, String> {
     let short = || "the file ends within the header".to_owned();
     let major = *bytes.get(6).ok_or_else(short)?;
     let (length, start) = if major == 1 {

@@ -1,0 +1,201 @@
+//! Cameras of other tools: what is written reads back; what their tools wrote is read.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::path::{Path, PathBuf};
+
+use accurate_geom::nalgebra::{Matrix3, Rotation3, Vector3};
+use accurate_geom::{Camera, Distortion, ImageSize, LengthUnit};
+use accurate_io::{CameraFormat, IoError, NamedView, ViewDefaults, read_cameras, write_cameras};
+use proptest::prelude::*;
+
+fn views() -> impl Strategy<Value = Vec<NamedView>> {
+    let view = (
+        prop::array::uniform3(-3.0..3.0f64),
+        prop::array::uniform3(-900.0..900.0f64),
+        prop::array::uniform4(200.0..3000.0f64),
+        prop::array::uniform4(-0.1..0.1f64),
+        any::<bool>(),
+    )
+        .prop_map(|(turn, t, k, d, lens)| {
+            let r = *Rotation3::new(Vector3::from(turn)).matrix();
+            let k = Matrix3::new(k[0], 0.0, k[2], 0.0, k[1], k[3], 0.0, 0.0, 1.0);
+            let size = ImageSize { width: 512, height: 400 };
+            let camera = Camera::new(k, r, Vector3::from(t), size).unwrap();
+            let [k1, k2, p1, p2] = d;
+            let lens = lens.then_some(Distortion { k1, k2, p1, p2, k3: 0.0 });
+            let camera = match lens {
+                Some(lens) => camera.with_distortion(lens).unwrap(),
+                None => camera,
+            };
+            let (unit, frame) = (LengthUnit::Millimetre, "as in the file".to_owned());
+            NamedView { name: "v".into(), camera, unit, frame, notes: vec![] }
+        });
+    prop::collection::vec(view, 2)
+}
+
+const MM: ViewDefaults = ViewDefaults { image_size: None, unit: Some(LengthUnit::Millimetre) };
+
+fn there_and_back(views: &[NamedView], name: &str, format: CameraFormat) -> Vec<NamedView> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    write_cameras(&path, views, format).unwrap();
+    read_cameras(&[path], &MM).unwrap()
+}
+
+proptest! {
+    // Each case writes and syncs files.
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn formats_that_hold_every_number_give_back_the_same_bits(views in views()) {
+        for (name, format) in [
+            ("c.yml", CameraFormat::OpencvYaml),
+            ("c.xml", CameraFormat::OpencvXml),
+            ("c.toml", CameraFormat::Rig),
+            ("c.json", CameraFormat::ViewsJson),
+        ] {
+            let read = there_and_back(&views, name, format);
+            prop_assert_eq!(read.len(), 2);
+            for (a, b) in views.iter().zip(&read) {
+                prop_assert_eq!(&a.camera, &b.camera, "{}", name);
+                prop_assert_eq!(b.unit, LengthUnit::Millimetre);
+            }
+        }
+    }
+
+    #[test]
+    fn colmap_gives_back_the_camera_within_rounding(views in views()) {
+        let read = there_and_back(&views, "colmap", CameraFormat::Colmap);
+        for (a, b) in views.iter().zip(&read) {
+            // A quaternion and half a pixel there and back: a few roundings of numbers up to 3000.
+            let tolerance = 64.0 * f64::EPSILON * 3000.0;
+            prop_assert!((a.camera.k() - b.camera.k()).amax() < tolerance);
+            prop_assert!((a.camera.r() - b.camera.r()).amax() < 64.0 * f64::EPSILON);
+            prop_assert_eq!(a.camera.t(), b.camera.t());
+            prop_assert_eq!(a.camera.distortion(), b.camera.distortion());
+        }
+    }
+
+    #[test]
+    fn matrices_project_as_before(views in views()) {
+        let plain: Vec<NamedView> = views
+            .into_iter()
+            .map(|v| {
+                let c = &v.camera;
+                let camera = Camera::new(*c.k(), *c.r(), *c.t(), c.size()).unwrap();
+                NamedView { camera, ..v }
+            })
+            .collect();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.txt");
+        write_cameras(&path, &plain, CameraFormat::MatrixText).unwrap();
+        let defaults =
+            ViewDefaults { image_size: Some(ImageSize { width: 512, height: 400 }), unit: None };
+        let read = read_cameras(&[path], &defaults).unwrap();
+        for (a, b) in plain.iter().zip(&read) {
+            let (p, q) = (a.camera.projection_matrix(), b.camera.projection_matrix());
+            // RQ and the product again; entries reach 3000 * 900 * 2.
+            prop_assert!((p - q).amax() < 1e3 * f64::EPSILON * p.amax(), "{} {}", p, q);
+        }
+    }
+}
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/opencv").join(name)
+}
+
+#[test]
+fn files_that_cv2_wrote_are_read() {
+    let defaults =
+        ViewDefaults { image_size: Some(ImageSize { width: 640, height: 480 }), unit: MM.unit };
+    for ext in ["yml", "xml"] {
+        let files = ["intrinsics", "extrinsics"].map(|n| fixture(&format!("{n}.{ext}")));
+        let views = read_cameras(&files, &defaults).unwrap();
+        assert_eq!(views.len(), 2);
+        let (c1, c2) = (&views[0].camera, &views[1].camera);
+        assert_eq!(c1.k()[(0, 0)], 1200.5);
+        assert_eq!(c2.k()[(1, 2)], 239.25);
+        assert_eq!(c1.r(), &Matrix3::identity());
+        assert_eq!(c2.t(), &Vector3::new(-250.0, 1.0 / 3.0, 1e-7));
+        assert_eq!(c1.distortion().unwrap().k2, -0.2);
+        // cv2.Rodrigues([0.1, -0.7, 0.3]).
+        let r = Rotation3::new(Vector3::new(0.1, -0.7, 0.3));
+        assert!((c2.r() - r.matrix()).amax() < 1e-15);
+    }
+}
+
+#[test]
+fn what_is_missing_or_not_understood_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        read_cameras(&[path], &ViewDefaults::default())
+    };
+    let k = "K: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 1., 0., 2., 0., 1., 2., 0., 0., 1. ]\n";
+    let cases = [
+        ("a.yml", format!("%YAML:1.0\n---\n{k}"), "states no image size"),
+        ("a.yml", format!("%YAML:1.0\n---\n{}", k.replace("1. ]", "1., 7. ]")), "10 given"),
+        (
+            "a.yml",
+            format!("%YAML:1.0\n---\n{}", k.replace("2.,", ".Nan,")),
+            "must be a list of numbers",
+        ),
+        ("a.yml", format!("%YAML:1.0\n---\n{}", "[".repeat(100_000)), "nested deeper"),
+        ("a.yml", "%YAML:1.0\n---\nD: 3\n".into(), "not in the file; looked for K, M"),
+        ("a.xml", "<a><b/></a>".into(), "expected <opencv_storage>"),
+        ("a.xml", format!("<opencv_storage>{}", "<a>".repeat(100_000)), "nested deeper"),
+        ("a.xml", "<!DOCTYPE a [<!ENTITY x \"y\">]><opencv_storage/>".into(), "document types"),
+        ("p.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n".into(), "states no image size"),
+        ("m.json", "{\"CameraParameters1\": {}}".into(), "RotationOfCamera2"),
+        ("m.json", "{\"a\": 1}".into(), "without the fields of a known camera"),
+        ("m.bin", "hello".into(), "no known camera file (it begins with `hello`)"),
+    ];
+    for (name, text, expected) in cases {
+        let error = read(name, &text).unwrap_err().to_string();
+        assert!(error.contains(expected), "{name}: {error}");
+    }
+    std::fs::write(folder.path().join("cameras.txt"), "1 PINHOLE 9 9 1 1 4 4\n").unwrap();
+    let error = read("images.txt", "1 10 20 30 1 0 0 0 1 a.png\n\n").unwrap_err().to_string();
+    assert!(error.contains("the translation seems to stand before the quaternion"), "{error}");
+}
+
+#[test]
+fn matlab_counts_pixels_from_one_and_transposes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stereo.json");
+    let camera = r#"{"IntrinsicMatrix": [[800,0,0],[0,810,0],[321,241,1]], "RadialDistortion": [0.1,0.2],
+        "TangentialDistortion": [0,0], "ImageSize": [480,640], "WorldUnits": "mm"}"#;
+    let text = format!(
+        r#"{{"CameraParameters1": {camera}, "CameraParameters2": {camera},
+            "RotationOfCamera2": [[0,1,0],[-1,0,0],[0,0,1]], "TranslationOfCamera2": [5,6,7]}}"#
+    );
+    std::fs::write(&path, text).unwrap();
+    let views = read_cameras(&[path], &ViewDefaults::default()).unwrap();
+    let c = &views[1].camera;
+    assert_eq!(c.k(), &Matrix3::new(800.0, 0.0, 320.0, 0.0, 810.0, 240.0, 0.0, 0.0, 1.0));
+    assert_eq!(c.size(), ImageSize { width: 640, height: 480 });
+    // Row vector (1, 0, 0) R = (0, 1, 0): as a column, R takes x to y.
+    assert_eq!(c.r() * Vector3::x(), Vector3::y());
+    assert_eq!(c.t(), &Vector3::new(5.0, 6.0, 7.0));
+    assert_eq!(c.distortion().unwrap().k2, 0.2);
+}
+
+#[test]
+fn simulators_of_radiographs_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drr.json");
+    let pose = "[[1,0,0,1],[0,1,0,2],[0,0,1,700],[0,0,0,1]]";
+    let text = format!(
+        r#"[{{"sdd": 1000, "height": 200, "width": 300, "delx": 0.5, "dely": 0.5, "x0": 5, "y0": 0, "extrinsic": {pose}}},
+            {{"intrinsic": [[2000,0,150],[0,2000,100],[0,0,1]], "extrinsic": {pose}, "sensor_width": 300, "sensor_height": 200}}]"#
+    );
+    std::fs::write(&path, text).unwrap();
+    let views = read_cameras(&[path.clone()], &ViewDefaults::default()).unwrap();
+    let k = views[0].camera.k();
+    // The middle of 300 px is between pixels 149 and 150; x0 = 5 mm is 10 px.
+    assert_eq!((k[(0, 0)], k[(0, 2)], k[(1, 2)]), (2000.0, 159.5, 99.5));
+    assert_eq!(views[1].camera.t(), &Vector3::new(1.0, 2.0, 700.0));
+    std::fs::write(&path, r#"{"sdd": 0, "height": 2, "width": 3, "delx": 1, "dely": 1}"#).unwrap();
+    let error = read_cameras(&[path], &ViewDefaults::default()).unwrap_err();
+    assert!(matches!(error, IoError::Field { .. }), "{error}");
+}
