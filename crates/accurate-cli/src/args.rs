@@ -1,5 +1,6 @@
 use std::path::PathBuf;
 
+use accurate3d::geom::{ImageSize, LengthUnit};
 use accurate3d::synth::Family;
 use accurate3d::table::{Format, ScoreKind};
 use accurate3d::{FigureKind, InputKind, Method};
@@ -86,6 +87,9 @@ pub enum Command {
     Reproduce(ReproduceArgs),
     /// Run a recorded experiment again and compare every file.
     Verify(VerifyArgs),
+    /// Show cameras of any known file in one convention, or convert them.
+    #[command(subcommand)]
+    Camera(CameraCommand),
     /// Say what the code of an error means and what to do about it.
     Explain(ExplainArgs),
     /// Print the completion script of a shell.
@@ -215,6 +219,63 @@ pub struct ImportArgs {
 pub enum ConfigCommand {
     /// Print the JSON schema of the config file.
     Schema,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum CameraCommand {
+    /// Print K, R, t and P = K [R | t] of every view, and what was assumed to get there.
+    Show(CameraArgs),
+    /// Write the cameras in another tool's format.
+    Convert(ConvertArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct CameraArgs {
+    /// DICOM XA, OpenCV YAML or XML (intrinsics and extrinsics may be two files), COLMAP text
+    /// (folder), 3x4 matrices (text, CSV, NPY), MATLAB, DiffDRR or DeepDRR JSON, rig files, pair
+    /// folders. The kind is told by content.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Image size, for files that state none.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub image_size: Option<ImageSize>,
+    /// Unit of the world (mm, cm, m or unit), for files that state none.
+    #[arg(long)]
+    pub unit: Option<LengthUnit>,
+}
+
+#[derive(Debug, Args)]
+pub struct ConvertArgs {
+    #[command(flatten)]
+    pub cameras: CameraArgs,
+    /// The format to write.
+    #[arg(long, value_enum)]
+    pub to: CameraTarget,
+    /// The file to write; for COLMAP a folder.
+    #[arg(short, long, value_name = "OUT")]
+    pub out: PathBuf,
+}
+
+/// A format that cameras are written in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CameraTarget {
+    OpencvYaml,
+    OpencvXml,
+    Colmap,
+    RigToml,
+    RigJson,
+    /// 3x4 matrices as text.
+    PTxt,
+    /// What `camera show --json` prints.
+    ViewsJson,
+}
+
+fn parse_size(text: &str) -> Result<ImageSize, String> {
+    let sides = text.split_once('x').map(|(w, h)| (w.parse(), h.parse()));
+    match sides {
+        Some((Ok(width), Ok(height))) if width > 0 && height > 0 => Ok(ImageSize { width, height }),
+        _ => Err("expected WIDTHxHEIGHT in px, e.g. 512x512".to_owned()),
+    }
 }
 
 #[derive(Debug, Args)]

@@ -11,6 +11,7 @@ mod code;
 mod commands;
 mod config;
 mod console;
+mod dicom_child;
 mod failure;
 mod segmentation;
 mod text;
@@ -42,6 +43,12 @@ fn main() -> ExitCode {
 }
 
 fn run(words: Vec<std::ffi::OsString>) -> Result<(), Failure> {
+    // Before anything else takes memory: this process may be the limited reader of one file.
+    if words.get(1).is_some_and(|word| word == dicom_child::WORD)
+        && let Some(path) = words.get(3)
+    {
+        return dicom_child::child(std::path::Path::new(path));
+    }
     // What a config file says stands before what the user says, and the last word wins.
     let command = Cli::command().args_override_self(true);
     let words = config::expand(&command, words)?;

@@ -8,7 +8,6 @@
 //! - [`write_mask_nifti`]: a mask as a NIfTI label map.
 //! - [`read_cameras`], [`write_cameras`]: cameras of other tools, and of DICOM XA with the feature
 //!   `dicom`.
-//! - [`read_curve`], [`write_curve`]: 3D curves as CSV, PLY, VTK PolyData or NPY.
 //! - [`read_grey`], [`read_mask`] and their writers: images as arrays `[[y, x]]`.
 //! - [`read_manifest`]: what a data set is, where it comes from and under which licence.
 //!
@@ -52,11 +51,10 @@ mod vtp;
 
 pub use atomic::{remove_unfinished, write_atomically};
 pub use bounded::read_file;
-pub use curve::{Column, CurveTable, is_curve_file, read_curve, write_curve};
 pub use cameras::{
     CameraFormat, CameraSource, NamedView, ViewDefaults, is_dicom, read_cameras, write_cameras,
 };
-pub use curve::{Column, CurveTable, read_curve, write_curve};
+pub use curve::{Column, CurveTable, is_curve_file, read_curve, write_curve};
 #[cfg(feature = "dicom")]
 pub use dicom::{DicomPixels, FrameChoice, read_dicom_pixels, read_dicom_view};
 pub use distortion::{read_distortion, undistort_points};

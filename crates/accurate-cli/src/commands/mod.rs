@@ -1,3 +1,4 @@
+mod camera;
 mod demo;
 mod eval;
 mod explain;
@@ -45,6 +46,7 @@ pub fn run(cli: &Cli, config: &str) -> Result<(), Failure> {
         Command::Demo(args) => demo::run(args, &console),
         Command::Reproduce(args) => reproduce::run(args, &console),
         Command::Verify(args) => verify::run(args, &console),
+        Command::Camera(command) => camera::run(command, &console),
         Command::Explain(args) => explain::run(args, &console),
         Command::Completions { shell } => shell::completions(*shell, &console),
         Command::Man => shell::manual(&console),
