@@ -18,6 +18,25 @@ pub struct CalibrationPriors {
 impl CalibrationPriors {
     /// A turn of some 0.03 degrees under f = 1200 px, or a principal point half a pixel off.
     pub const DEFAULT: Self = Self { shift_sigma_px: 0.7, roll_sigma_rad: 1e-3 };
+
+    pub(crate) fn validate(&self) -> Result<(), FitError> {
+        for (name, value) in
+            [("shift_sigma_px", self.shift_sigma_px), ("roll_sigma_rad", self.roll_sigma_rad)]
+        {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(FitError::BadParameter { name, value });
+            }
+        }
+        Ok(())
+    }
+
+    /// Weights of shift x, shift y and roll in a cost that counts squares in units of a residual's
+    /// `variance`, px².
+    pub(crate) fn weights(&self, variance: f64) -> [f64; 3] {
+        let weight = |sigma: f64| variance / (sigma * sigma);
+        let shift = weight(self.shift_sigma_px);
+        [shift, shift, weight(self.roll_sigma_rad)]
+    }
 }
 
 /// What the curve itself says about the calibration of view 2.
@@ -58,7 +77,7 @@ impl CalibrationEstimate {
         Ok(Rig::new(rig.camera1().clone(), camera2, rig.unit())?)
     }
 
-    fn new(shift_px: [f64; 2], roll_rad: f64, covariance: Matrix3<f64>) -> Self {
+    pub(crate) fn new(shift_px: [f64; 2], roll_rad: f64, covariance: Matrix3<f64>) -> Self {
         let shift = Matrix2::new(
             covariance[(0, 0)],
             covariance[(0, 1)],
@@ -121,18 +140,8 @@ pub fn fit_outlines_and_calibration(
 ) -> Result<CalibratedFit, FitError> {
     params.validate()?;
     adaptive.validate()?;
-    for (name, value) in
-        [("shift_sigma_px", priors.shift_sigma_px), ("roll_sigma_rad", priors.roll_sigma_rad)]
-    {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(FitError::BadParameter { name, value });
-        }
-    }
-    // The cost counts squares in units of a residual's variance.
-    let variance = adaptive.noise_inflation / 18.0;
-    let weight = |sigma: f64| variance / (sigma * sigma);
-    let shift = weight(priors.shift_sigma_px);
-    let weights = [shift, shift, weight(priors.roll_sigma_rad)];
+    priors.validate()?;
+    let weights = priors.weights(adaptive.noise_inflation / 18.0);
     let priors = Priors { nuisance_weights: Some(weights) };
     let found = fit_posterior(start, outlines, rig, params, adaptive, priors)?;
     let calibration = CalibrationEstimate::new(

@@ -1,3 +1,4 @@
+use accurate_geom::nalgebra::Matrix3;
 use accurate_geom::{Curve3, Pixel, Rig, View1, View2};
 
 use crate::covariance::CurveCovariance;
@@ -10,9 +11,10 @@ use crate::point_problem::{
 };
 use crate::pool::Pool;
 use crate::pose::px_per_unit;
+use crate::projector::Nuisance;
 use crate::projector::Projector;
 use crate::selected_inverse::SelectedInverse;
-use crate::{FitError, start_curve};
+use crate::{CalibrationEstimate, CalibrationPriors, FitError, start_curve};
 
 /// Parameters of [`fit_points`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +42,9 @@ pub struct PointFitParams {
     pub max_mean_distance_px: f64,
     /// A match that leaves more than this of a curve without partner is refused.
     pub min_coverage: f64,
+    /// How wrong the calibration of view 2 may be; `None`: it is exact. Else a shift of image 2 and a
+    /// roll of its camera are unknowns.
+    pub calibration: Option<CalibrationPriors>,
 }
 
 impl PointFitParams {
@@ -55,6 +60,7 @@ impl PointFitParams {
         rounds: 12,
         max_mean_distance_px: 1.0,
         min_coverage: 0.98,
+        calibration: None,
     };
 
     fn validate(&self) -> Result<(), FitError> {
@@ -69,7 +75,7 @@ impl PointFitParams {
                 return Err(FitError::BadParameter { name, value });
             }
         }
-        Ok(())
+        self.calibration.map_or(Ok(()), |priors| priors.validate())
     }
 }
 
@@ -92,8 +98,18 @@ pub struct PointFit {
     pub coverage: f64,
     /// Levenberg-Marquardt steps that lowered the cost.
     pub steps: usize,
-    /// Uncertainty of the curve.
+    /// Mean of the squared residuals in units of their variance: about 1 where the curve explains the
+    /// points; 1 by construction where the noise was estimated.
+    pub chi2_per_point: f64,
+    /// -2 ln of the probability of the points (Laplace's approximation), up to a constant of the
+    /// points: of several fits to the same points the one with the least is the likeliest, since a
+    /// wrong start is paid for in residuals or in bends that nothing asks for.
+    pub surprise: f64,
+    /// Uncertainty of the curve, which includes what the calibration leaves uncertain if that was
+    /// estimated.
     pub covariance: CurveCovariance,
+    /// What the points say about the calibration of view 2, if asked.
+    pub calibration: Option<CalibrationEstimate>,
 }
 
 /// Smoothness at the start, as [`OutlineFitParams::lambda3`](crate::OutlineFitParams::lambda3).
@@ -159,7 +175,7 @@ pub fn fit_points(
             break;
         }
     }
-    fitter.finish(&start, before, steps)
+    fitter.finish(&start, params, before, steps)
 }
 
 struct Fitter<'a> {
@@ -203,10 +219,15 @@ impl<'a> Fitter<'a> {
             projectors,
             steps: (params.knot_spacing_px / 1.5).ceil().clamp(2.0, 64.0) as usize,
             local_smoothness: vec![1.0; spline.spans()],
+            nuisance_weights: params
+                .calibration
+                .map(|priors| priors.weights(params.noise_inflation * noise_px * noise_px)),
         };
-        let normal = NormalEquations::new(spline.control.len(), 0)?;
+        let globals = if params.calibration.is_some() { 3 } else { 0 };
+        let normal = NormalEquations::new(spline.control.len(), globals)?;
         let pool = Pool::new(params.window_px / spacing_px, spline.spans());
-        let mut current = PointEvaluation::new(PointState { spline, parameters });
+        let mut current =
+            PointEvaluation::new(PointState { spline, parameters, nuisance: Nuisance::default() });
         problem.evaluate(&mut current, &settings)?;
         let trial = current.clone();
         Ok(Self {
@@ -231,7 +252,11 @@ impl<'a> Fitter<'a> {
         for _ in 0..6 {
             if let Ok(step) = normal.solve(*damping) {
                 trial.state.clone_from(&current.state);
-                trial.state.spline.add(step);
+                let controls = 3 * trial.state.spline.control.len();
+                trial.state.spline.add(&step[..controls]);
+                if problem.nuisance_weights.is_some() {
+                    trial.state.nuisance.add(&step[controls..]);
+                }
                 // A step behind a camera is a step too long.
                 if problem.evaluate(trial, settings).is_ok()
                     && problem.cost(trial, &current.rows, settings) <= before
@@ -277,6 +302,7 @@ impl<'a> Fitter<'a> {
             self.settings.huber_px = params.huber_sigmas * noise;
         }
         let variance = params.noise_inflation * self.noise_px * self.noise_px;
+        self.problem.nuisance_weights = params.calibration.map(|priors| priors.weights(variance));
         let control = &self.current.state.spline.control;
         let lambda3 = self.settings.lambda3;
         let factors = &self.problem.local_smoothness;
@@ -293,15 +319,46 @@ impl<'a> Fitter<'a> {
         (sum / n.max(1) as f64).sqrt()
     }
 
+    /// [`PointFit::surprise`] at the current curve.
+    fn surprise(&self, inverse: &SelectedInverse, params: &PointFitParams) -> f64 {
+        let variance = params.noise_inflation * self.noise_px * self.noise_px;
+        // Repeated errors count once: so many residuals are worth `1 / noise_inflation` each. A point
+        // beyond a free end counts as one of the size of the noise, or leaving points out would pay.
+        let rows = self.current.rows.len() as f64;
+        let unused = self.current.rows.iter().filter(|row| !row.used).count() as f64;
+        let cost = self.problem.cost(&self.current, &self.current.rows, &self.settings) / variance
+            + unused / params.noise_inflation;
+        let scale = rows / params.noise_inflation * variance.ln();
+        // The prior's own measure; what it leaves open (9 unknowns) is the same in every fit.
+        let prior: f64 = self
+            .problem
+            .local_smoothness
+            .iter()
+            .map(|factor| 3.0 * (self.settings.lambda3 * factor / variance).ln())
+            .sum();
+        let unknowns = 3.0 * self.current.state.spline.control.len() as f64;
+        let posterior = inverse.log_determinant() - unknowns * variance.ln();
+        cost + scale - prior + posterior
+    }
+
     fn finish(
         mut self,
         start: &Matched,
+        params: &PointFitParams,
         rms_before_px: f64,
         steps: usize,
     ) -> Result<PointFit, FitError> {
         let inverse = self.inverse()?;
         let variance = COVARIANCE_INFLATION * self.noise_px * self.noise_px;
+        let first = 3 * self.current.state.spline.control.len();
+        let calibration = params.calibration.map(|_| {
+            let Nuisance { shift_px, roll } = self.current.state.nuisance;
+            let spread = Matrix3::from_fn(|a, b| variance * inverse.get(first + a, first + b));
+            CalibrationEstimate::new(shift_px, roll, spread)
+        });
         let rms = self.rms();
+        let chi2_per_point = (rms / self.noise_px).powi(2);
+        let surprise = self.surprise(&inverse, params);
         let state = self.current.state;
         let end = state.spline.spans() as f64;
         let beyond = [0, 1].map(|view| {
@@ -317,6 +374,9 @@ impl<'a> Fitter<'a> {
             mean_distance_px: start.mean_distance_px,
             coverage: start.coverage,
             steps,
+            chi2_per_point,
+            surprise,
+            calibration,
             covariance: CurveCovariance::new(&inverse, state.spline.control.len(), variance),
             parameters: state.parameters,
         })

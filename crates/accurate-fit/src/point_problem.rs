@@ -5,7 +5,7 @@ use crate::chords::Chords;
 use crate::normal::NormalEquations;
 use crate::outline_problem::smoothness;
 use crate::point_data::PointData;
-use crate::projector::Projector;
+use crate::projector::{Nuisance, Projector};
 use crate::uniform_spline::{UniformSpline, basis, basis_1};
 
 /// Ordered points of two views and their cameras.
@@ -17,6 +17,9 @@ pub(crate) struct PointProblem<'a> {
     pub(crate) steps: usize,
     /// Factors of `lambda3` along the curve.
     pub(crate) local_smoothness: Vec<f64>,
+    /// Weights of the priors of view 2's shift and roll, in units of a residual's variance; `None`:
+    /// its calibration is exact.
+    pub(crate) nuisance_weights: Option<[f64; 3]>,
 }
 
 /// Weight of a point's progress along the curve in its association, beside its distance.
@@ -36,6 +39,7 @@ pub(crate) struct PointSettings {
 pub(crate) struct PointState {
     pub(crate) spline: UniformSpline,
     pub(crate) parameters: [Vec<f64>; 2],
+    pub(crate) nuisance: Nuisance,
 }
 
 /// One residual: the distance of a point from the projected curve along its normal, or one
@@ -45,6 +49,8 @@ pub(crate) struct PointRow {
     pub(crate) span: usize,
     pub(crate) basis: [f64; 4],
     pub(crate) gradient: [f64; 3],
+    /// Derivatives with respect to view 2's shift and roll; zero in view 1.
+    pub(crate) global: [f64; 3],
     pub(crate) residual: f64,
     /// A point of a free end that lies beyond the curve is no datum.
     pub(crate) used: bool,
@@ -74,7 +80,12 @@ impl PointProblem<'_> {
         e.rows.clear();
         let end = e.state.spline.spans() as f64;
         for view in 0..2 {
-            let projector = &self.projectors[view];
+            let mut projector = self.projectors[view].clone();
+            if view == 1 {
+                projector.set_nuisance(e.state.nuisance);
+            }
+            let projector = &projector;
+            let first_row = e.rows.len();
             e.chords.rebuild(&e.state.spline, projector, view as u8 + 1, self.steps)?;
             e.chords.measure();
             let data = &self.data[view];
@@ -106,6 +117,10 @@ impl PointProblem<'_> {
                 e.rows.push(PointRow { used: !beyond, ..row });
                 e.state.parameters[view][i] = u;
                 reached = u;
+            }
+            if view == 0 {
+                // The calibration of view 1 is exact.
+                e.rows[first_row..].iter_mut().for_each(|row| row.global = [0.0; 3]);
             }
         }
         Ok(())
@@ -140,6 +155,7 @@ impl PointProblem<'_> {
             span,
             basis: basis(t),
             gradient: [g.x, g.y, g.z],
+            global: [-normal.x, -normal.y, -normal.dot(&projector.roll_derivative(&p))],
             residual: normal.dot(&(q - p)),
             used: true,
         };
@@ -157,12 +173,16 @@ impl PointProblem<'_> {
     ) {
         let (span, t) = spline.locate(u);
         let (p, jacobian) = projector.project_with_jacobian(&spline.combine(span, basis(t)));
+        let roll = projector.roll_derivative(&p);
         for axis in 0..2 {
             let g = -jacobian.row(axis);
+            let mut global = [0.0, 0.0, -roll[axis]];
+            global[axis] = -1.0;
             rows.push(PointRow {
                 span,
                 basis: basis(t),
                 gradient: [g[0], g[1], g[2]],
+                global,
                 residual: q[axis] - p[axis],
                 used: true,
             });
@@ -187,7 +207,10 @@ impl PointProblem<'_> {
                 if r <= k { r * r } else { k * (2.0 * r - k) }
             })
             .sum();
-        sum + smoothness(&e.state.spline, 0.0, settings.lambda3, &self.local_smoothness)
+        let prior: f64 = self
+            .nuisance_weights
+            .map_or(0.0, |w| e.state.nuisance.values().iter().zip(w).map(|(v, w)| w * v * v).sum());
+        sum + prior + smoothness(&e.state.spline, 0.0, settings.lambda3, &self.local_smoothness)
     }
 
     pub(crate) fn assemble(
@@ -199,7 +222,19 @@ impl PointProblem<'_> {
         normal.clear();
         for row in e.rows.iter().filter(|row| row.used) {
             let weight = huber_weight(row.residual, settings.huber_px);
-            normal.add(row.span, &row.basis, &row.gradient, row.residual, weight);
+            if self.nuisance_weights.is_some() {
+                let PointRow { span, basis, gradient, global, residual, .. } = row;
+                normal.add_with_globals(*span, basis, gradient, global, *residual, weight);
+            } else {
+                normal.add(row.span, &row.basis, &row.gradient, row.residual, weight);
+            }
+        }
+        if let Some(weights) = self.nuisance_weights {
+            for (k, (value, weight)) in
+                e.state.nuisance.values().into_iter().zip(weights).enumerate()
+            {
+                normal.add_prior(k, value, weight);
+            }
         }
         let control = &e.state.spline.control;
         normal.add_smoothness(control, 0.0, settings.lambda3, &self.local_smoothness);

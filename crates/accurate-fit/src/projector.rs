@@ -9,6 +9,20 @@ pub(crate) struct Nuisance {
     pub(crate) roll: f64,
 }
 
+impl Nuisance {
+    /// Shift x, shift y, roll: the order of the unknowns.
+    pub(crate) fn values(&self) -> [f64; 3] {
+        [self.shift_px[0], self.shift_px[1], self.roll]
+    }
+
+    /// Adds a step in the same order.
+    pub(crate) fn add(&mut self, step: &[f64]) {
+        self.shift_px[0] += step[0];
+        self.shift_px[1] += step[1];
+        self.roll += step[2];
+    }
+}
+
 /// One camera, ready to project many points with derivatives.
 #[derive(Debug, Clone)]
 pub(crate) struct Projector {

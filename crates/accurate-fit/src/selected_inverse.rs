@@ -11,6 +11,7 @@ pub(crate) struct SelectedInverse {
     /// Rows of each column of the lower triangle, ascending, the diagonal first.
     rows: Vec<usize>,
     values: Vec<f64>,
+    log_determinant: f64,
 }
 
 impl SelectedInverse {
@@ -22,8 +23,10 @@ impl SelectedInverse {
             column_start: column_start.to_vec(),
             rows: rows.to_vec(),
             values: vec![0.0; factor.len()],
+            log_determinant: 0.0,
         };
         let n = column_start.len() - 1;
+        inverse.log_determinant = column_start[..n].iter().map(|&c| 2.0 * factor[c].ln()).sum();
         for column in (0..n).rev() {
             let (first, last) = (column_start[column], column_start[column + 1]);
             let pivot = factor[first];
@@ -42,6 +45,11 @@ impl SelectedInverse {
             inverse.values[first] = (1.0 / pivot - sum) / pivot;
         }
         inverse
+    }
+
+    /// Logarithm of the determinant of the matrix (not of its inverse).
+    pub(crate) fn log_determinant(&self) -> f64 {
+        self.log_determinant
     }
 
     /// One entry; 0 if it was not selected.
