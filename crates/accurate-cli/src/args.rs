@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use accurate3d::geom::{ImageSize, LengthUnit};
 use accurate3d::synth::Family;
 use accurate3d::table::{Format, ScoreKind};
-use accurate3d::{FigureKind, InputKind, Method};
+use accurate3d::{Closure, FigureKind, InputKind, Method};
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 
 use crate::code::Code;
@@ -357,10 +357,13 @@ pub struct ReconstructArgs {
     /// Also write the report, one HTML page that needs no network; same as --out FILE.html.
     #[arg(long, value_name = "FILE.html")]
     pub report: Option<PathBuf>,
-    /// Estimate a small shift and turn of camera 2 together with the curve (accurate mode on masks
-    /// only).
+    /// Estimate a small shift and turn of camera 2 together with the curve (accurate mode only).
     #[arg(long)]
     pub refine_calibration: bool,
+    /// Whether the body is a ring without ends: yes, no, or auto, if both views show it (accurate
+    /// mode only).
+    #[arg(long, default_value_t, value_name = "auto|yes|no")]
+    pub closed: Closure,
     /// Exit with code 4 if a result is suspect; it is written all the same.
     #[arg(long)]
     pub strict: bool,
@@ -578,8 +581,7 @@ pub struct TableArgs {
     /// Write the table here instead of to stdout.
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Estimate a small shift and turn of camera 2 together with the curve (accurate mode on masks
-    /// only).
+    /// Estimate a small shift and turn of camera 2 together with the curve (accurate mode only).
     #[arg(long)]
     pub refine_calibration: bool,
     /// Instead of a table: measure every cell of this file and compare it with its accepted

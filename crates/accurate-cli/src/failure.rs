@@ -140,6 +140,8 @@ impl From<Error> for Failure {
                 .with_hint("order the points yourself and use --input points"),
             Error::Matching { .. } => Self::new(Code::NoMatch, message)
                 .with_hint("check that the calibration belongs to these views, in this order"),
+            Error::NotClosed { .. } => Self::new(Code::NoOrder, message)
+                .with_hint("leave --closed out for a body with two ends"),
             Error::NoCandidate { .. } => Self::new(Code::NoMatch, message)
                 .with_hint("check that the calibration belongs to these views, in this order"),
             Error::Fitting { .. } => Self::new(Code::NoFit, message),

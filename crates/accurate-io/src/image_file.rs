@@ -165,18 +165,6 @@ pub fn write_u16(path: &Path, image: &Array2<u16>) -> Result<(), IoError> {
     write_png(path, size, image.iter().copied().collect::<Vec<u16>>(), DynamicImage::ImageLuma16)
 }
 
-/// Writes an 8-bit colour PNG, red, green and blue per pixel, shape `(height, width)`.
-///
-/// # Errors
-/// As [`write_mask`].
-pub fn write_rgb(path: &Path, image: &Array2<[u8; 3]>) -> Result<(), IoError> {
-    let (width, height) = size_of(path, image.dim())?;
-    let buffer = ImageBuffer::from_raw(width, height, image.iter().flatten().copied().collect())
-        .ok_or_else(|| IoError::Empty { path: path.to_owned(), what: "pixels" })?;
-    let png = encode(path, &DynamicImage::ImageRgb8(buffer))?;
-    write_atomically(path, |w| w.write_all(&png))
-}
-
 /// Writes a grey image as PNG of its depth, values rounded to the nearest integer.
 ///
 /// # Errors

@@ -190,7 +190,7 @@ fn simulators_of_radiographs_are_read() {
             {{"intrinsic": [[2000,0,150],[0,2000,100],[0,0,1]], "extrinsic": {pose}, "sensor_width": 300, "sensor_height": 200}}]"#
     );
     std::fs::write(&path, text).unwrap();
-    let views = read_cameras(&[path.clone()], &ViewDefaults::default()).unwrap();
+    let views = read_cameras(std::slice::from_ref(&path), &ViewDefaults::default()).unwrap();
     let k = views[0].camera.k();
     // The middle of 300 px is between pixels 149 and 150; x0 = 5 mm is 10 px.
     assert_eq!((k[(0, 0)], k[(0, 2)], k[(1, 2)]), (2000.0, 159.5, 99.5));

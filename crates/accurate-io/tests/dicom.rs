@@ -30,7 +30,10 @@ fn file(elements: &[u8]) -> Vec<u8> {
 
 const PATIENT: &[u8] = b"SENTINEL^PATIENT";
 
-fn view_elements() -> Vec<((u16, u16), [u8; 2], Vec<u8>)> {
+/// Tag, value representation and bytes.
+type Element = ((u16, u16), [u8; 2], Vec<u8>);
+
+fn view_elements() -> Vec<Element> {
     let text = |t: &str| t.as_bytes().to_vec();
     vec![
         ((0x10, 0x10), *b"PN", PATIENT.to_vec()),
@@ -44,7 +47,7 @@ fn view_elements() -> Vec<((u16, u16), [u8; 2], Vec<u8>)> {
     ]
 }
 
-fn bytes_of(elements: &[((u16, u16), [u8; 2], Vec<u8>)]) -> Vec<u8> {
+fn bytes_of(elements: &[Element]) -> Vec<u8> {
     file(&elements.iter().flat_map(|(tag, vr, value)| element(*tag, vr, value)).collect::<Vec<_>>())
 }
 
@@ -96,7 +99,7 @@ fn each_missing_or_senseless_tag_is_named_and_never_quoted() {
 fn a_flip_mirrors_and_a_turn_turns() {
     let plain = read_dicom_view(&saved(&bytes_of(&view_elements())).1);
     assert!(plain.is_err(), "the folder is gone");
-    let with = |extra: Vec<((u16, u16), [u8; 2], Vec<u8>)>| {
+    let with = |extra: Vec<Element>| {
         let mut elements = view_elements();
         elements[3].2 = b"0.5\\0.5".to_vec();
         elements.splice(6..6, extra);

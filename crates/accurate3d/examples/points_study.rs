@@ -34,17 +34,19 @@ fn main() {
     let exact = args.next().is_some_and(|a| a == "exact");
     let families: Vec<Family> = args.map(|a| a.parse().expect("family")).collect();
     let families = if families.is_empty() { Family::ALL.to_vec() } else { families };
-    println!("family      Overall  median Max  mean Max  worst Max | paper: Overall  mean Max | 95 % ellipses");
+    println!(
+        "family      Overall  median Max  mean Max  worst Max | paper: Overall  mean Max | 95 % ellipses"
+    );
     for family in families {
-        let results: Vec<Result> =
-            (0..cases).into_par_iter().filter_map(|index| run(family, seed, index, exact)).collect();
+        let results: Vec<Result> = (0..cases)
+            .into_par_iter()
+            .filter_map(|index| run(family, seed, index, exact))
+            .collect();
         let all = |value: fn(&Result) -> f64| results.iter().map(value).collect::<Vec<f64>>();
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let worst = all(|r| r.scores.hausdorff / r.px);
-        let (inside, asked) = results
-            .iter()
-            .filter_map(|r| r.covered)
-            .fold((0, 0), |(a, b), (c, d)| (a + c, b + d));
+        let (inside, asked) =
+            results.iter().filter_map(|r| r.covered).fold((0, 0), |(a, b), (c, d)| (a + c, b + d));
         println!(
             "{:10} {:8.4} {:11.4} {:9.4} {:10.4} | {:14.4} {:9.4} | {:.3} of {} curves",
             family.to_string(),
@@ -96,7 +98,8 @@ fn unit_per_px(case: &SynthCase) -> f64 {
 fn covered(found: &Reconstruction, truth: &[Point3]) -> Option<(usize, usize)> {
     let covariances = found.covariances.as_ref()?;
     let points = found.positions();
-    let places: Vec<usize> = (STRIDE..points.len().saturating_sub(STRIDE)).step_by(STRIDE).collect();
+    let places: Vec<usize> =
+        (STRIDE..points.len().saturating_sub(STRIDE)).step_by(STRIDE).collect();
     let inside = |&&k: &&usize| {
         let tangent = (points[k + 1] - points[k - 1]).normalize();
         let first = tangent.cross(&Vector3::ith(tangent.iamin(), 1.0)).normalize();

@@ -1,6 +1,7 @@
+use std::borrow::Borrow;
 use std::ops::Range;
 
-use accurate_fit::CalibrationEstimate;
+use accurate_fit::{CalibrationEstimate, FitError, PointFit};
 use accurate_match::{CurveReconstruction, FreeMatch};
 use serde::Serialize;
 
@@ -37,6 +38,51 @@ pub struct Diagnostics {
     pub calibration: Option<CalibrationDiagnostics>,
     /// Why ordered points were matched but not adjusted, if so.
     pub not_adjusted: Option<String>,
+    /// How well the adjusted curve explains ordered points, if it was adjusted to them.
+    pub points_fit: Option<PointsDiagnostics>,
+    /// By how much a match in the other direction costs more per point, px, where both were tried:
+    /// the confidence in [`view2_reversed`](Self::view2_reversed).
+    pub direction_margin_px: Option<f64>,
+    /// Whether the curve is closed; its last point then repeats its first.
+    pub closed: bool,
+}
+
+/// How well an adjusted curve explains the ordered points of both views.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PointsDiagnostics {
+    /// Standard deviation of a point across the curve, px: that of rounding for whole pixels, else
+    /// estimated.
+    pub noise_px: f64,
+    /// Root mean square distance of the points from the curve, px, before and after.
+    pub rms_px: [f64; 2],
+    /// Mean of the squared distances in units of the noise's variance: about 1 if the curve explains
+    /// the points (by construction, where the noise was estimated).
+    pub chi2_per_point: f64,
+    /// Points of each view that lie beyond what the other one sees.
+    pub beyond: [usize; 2],
+}
+
+/// What came of the adjustment of ordered points.
+pub(crate) struct Adjustment {
+    refusal: Option<String>,
+    fit: Option<PointsDiagnostics>,
+    calibration: Option<CalibrationDiagnostics>,
+}
+
+impl Adjustment {
+    pub(crate) fn of<F: Borrow<PointFit>>(fit: &Result<F, FitError>) -> Self {
+        let done = fit.as_ref().ok().map(Borrow::borrow);
+        Self {
+            refusal: fit.as_ref().err().map(ToString::to_string),
+            fit: done.map(|fit| PointsDiagnostics {
+                noise_px: fit.noise_px,
+                rms_px: fit.rms_px,
+                chi2_per_point: fit.chi2_per_point,
+                beyond: fit.beyond,
+            }),
+            calibration: done.and_then(|fit| fit.calibration.as_ref()).map(Into::into),
+        }
+    }
 }
 
 /// The calibration of view 2 as estimated with the curve; view 1 is taken as exact.
@@ -107,6 +153,9 @@ impl Diagnostics {
             }),
             calibration: result.calibration.as_ref().map(CalibrationDiagnostics::from),
             not_adjusted: None,
+            points_fit: None,
+            direction_margin_px: None,
+            closed: false,
         }
     }
 
@@ -114,8 +163,13 @@ impl Diagnostics {
         matched: &FreeMatch,
         counts: [usize; 2],
         along_epipolar_line: &[bool],
-        not_adjusted: Option<String>,
+        adjustment: Adjustment,
     ) -> Self {
+        let Adjustment { refusal, fit, calibration } = adjustment;
+        let mut suspicions = suspicions(matched.mean_epipolar_distance_px, 1.0, [1.0; 2]);
+        let misfit = fit.is_some_and(|fit| fit.chi2_per_point > MOST_CHI2_PER_POINT);
+        suspicions.extend(misfit.then_some(Suspicion::Misfit));
+        suspicions.extend(refusal.is_some().then_some(Suspicion::NotAdjusted));
         let fraction = |range: &Range<usize>, count: usize| range.len() as f64 / count as f64;
         Self {
             mean_epipolar_distance_px: matched.mean_epipolar_distance_px,
@@ -129,10 +183,14 @@ impl Diagnostics {
             view2_reversed: matched.reversed,
             dropped_pairs: matched.dropped,
             along_epipolar_line: share(along_epipolar_line),
-            suspicions: suspicions(matched.mean_epipolar_distance_px, 1.0, [1.0; 2]),
+            suspicions,
             outline: None,
-            calibration: None,
-            not_adjusted,
+            calibration,
+            not_adjusted: refusal,
+            points_fit: fit,
+            // Infinite if the other direction is impossible.
+            direction_margin_px: matched.margin_px.filter(|margin| margin.is_finite()),
+            closed: false,
         }
     }
 
@@ -167,6 +225,9 @@ impl Diagnostics {
             outline: None,
             calibration: None,
             not_adjusted: None,
+            points_fit: None,
+            direction_margin_px: None,
+            closed: false,
         }
     }
 }
@@ -174,6 +235,9 @@ impl Diagnostics {
 fn share(flags: &[bool]) -> f64 {
     flags.iter().filter(|f| **f).count() as f64 / flags.len().max(1) as f64
 }
+
+/// Rounded points leave 1 if the curve is right, and about 1.2 if they also jump by a pixel at corners.
+const MOST_CHI2_PER_POINT: f64 = 1.5;
 
 /// A trace that leaves out more of a skeleton than a few spurs.
 const LEAST_COVERAGE: f64 = 0.95;

@@ -100,6 +100,16 @@ pub enum Error {
         /// Pairs whose ends agree.
         pairs: usize,
     },
+    /// A ring was asked for, but a view shows a body with ends.
+    #[error("case {case}, view {view}: the mask is not closed ({tips} tips)")]
+    NotClosed {
+        /// Case id.
+        case: String,
+        /// 1 or 2.
+        view: u8,
+        /// Tips of its skeleton.
+        tips: usize,
+    },
     /// A name stands for nothing.
     #[error(transparent)]
     Name(#[from] UnknownName),
@@ -125,7 +135,7 @@ impl Error {
     pub fn stage(&self) -> Option<Stage> {
         match self {
             Self::Segmentation { .. } | Self::NotSegmented { .. } => Some(Stage::Segmentation),
-            Self::Traversal { .. } => Some(Stage::Traversal),
+            Self::Traversal { .. } | Self::NotClosed { .. } => Some(Stage::Traversal),
             Self::Matching { .. } => Some(Stage::Matching),
             Self::Fitting { .. } => Some(Stage::Fitting),
             Self::NoCandidate { .. } => Some(Stage::Matching),

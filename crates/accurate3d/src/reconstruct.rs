@@ -1,3 +1,6 @@
+use std::fmt;
+use std::str::FromStr;
+
 use accurate_fit::PointFitParams;
 use accurate_geom::{Pixel, View, View1, View2};
 use accurate_match::FreeMatchParams;
@@ -7,11 +10,12 @@ use ndarray::Array2;
 
 use crate::direction::runs_against;
 use crate::ordered_points::adjusted_points;
+use crate::ring_masks::ring_masks;
 use crate::robust::reconstruct_masks;
 use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled};
 use crate::{
     Diagnostics, Error, Explanation, InputKind, Method, Reconstruction, RobustParams, Traces,
-    ViewPair,
+    UnknownName, ViewPair,
 };
 
 /// What to do with a pair.
@@ -25,12 +29,62 @@ pub struct Params {
     pub traverse: TraverseParams,
     /// Parameters of our own method.
     pub robust: RobustParams,
+    /// Whether the body is a ring (our own method only).
+    pub closure: Closure,
+}
+
+/// Whether the body is a ring: a curve without ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Closure {
+    /// Closed if both views show it: ordered points whose ends meet, masks without a tip.
+    #[default]
+    Auto,
+    /// It has two ends.
+    Open,
+    /// It has none.
+    Closed,
+}
+
+impl Closure {
+    /// The name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Open => "no",
+            Self::Closed => "yes",
+        }
+    }
+}
+
+impl FromStr for Closure {
+    type Err = UnknownName;
+
+    fn from_str(name: &str) -> Result<Self, Self::Err> {
+        let all = [Self::Auto, Self::Open, Self::Closed];
+        all.into_iter().find(|c| c.name() == name).ok_or_else(|| UnknownName {
+            what: "closure",
+            name: name.to_owned(),
+            expected: all.map(Self::name).join(", "),
+        })
+    }
+}
+
+impl fmt::Display for Closure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
 }
 
 impl Params {
     /// The published parameters for an input and a method.
     pub const fn new(input: InputKind, method: Method) -> Self {
-        Self { input, method, traverse: TraverseParams::PAPER, robust: RobustParams::DEFAULT }
+        Self {
+            input,
+            method,
+            traverse: TraverseParams::PAPER,
+            robust: RobustParams::DEFAULT,
+            closure: Closure::Auto,
+        }
     }
 }
 
@@ -40,7 +94,17 @@ impl Params {
         match (self.method, self.input) {
             (Method::Accurate, InputKind::Points) => vec![
                 ("matching", format!("{:?}", FreeMatchParams::DEFAULT)),
-                ("adjustment", format!("{:?}", PointFitParams::DEFAULT)),
+                (
+                    "adjustment",
+                    format!(
+                        "{:?}",
+                        PointFitParams {
+                            calibration: self.robust.calibration,
+                            ..PointFitParams::DEFAULT
+                        }
+                    ),
+                ),
+                ("closed", self.closure.to_string()),
             ],
             (Method::Accurate, _) => vec![("joint choice", format!("{:?}", self.robust))],
             (method, InputKind::Points) => vec![("matching", method.matching_described())],
@@ -66,7 +130,10 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
     }
     match (params.method, params.input) {
         (Method::Accurate, InputKind::Mask | InputKind::Image) => {
-            return joint_choice(pair, params);
+            return match ring_masks(pair, params)? {
+                Some(ring) => Ok(ring),
+                None => joint_choice(pair, params),
+            };
         }
         (Method::Accurate, InputKind::Points) => return adjusted_points(pair, params),
         _ => {}

@@ -45,16 +45,37 @@ impl Reconstruction {
         self.points.windows(2).map(|w| (w[1].position - w[0].position).norm()).sum()
     }
 
-    /// The curve with its per-point columns, ready for any curve file.
-    pub fn curve_table(&self) -> CurveTable {
+    /// Stretches that run along an epipolar line in a view, as arc lengths from the begin: their depth
+    /// is weakly seen.
+    pub fn weak_stretches(&self) -> Vec<[f64; 2]> {
+        let arc = self.arc_lengths();
+        let mut stretches: Vec<[f64; 2]> = Vec::new();
+        let mut open = false;
+        for (weak, s) in self.along_epipolar_line.iter().zip(arc) {
+            match (weak, open, stretches.last_mut()) {
+                (true, true, Some(last)) => last[1] = s,
+                (true, ..) => stretches.push([s, s]),
+                _ => {}
+            }
+            open = *weak;
+        }
+        stretches
+    }
+
+    fn arc_lengths(&self) -> Vec<f64> {
         let mut travelled = 0.0;
-        let mut arc_length = Vec::with_capacity(self.points.len());
+        let mut arc_lengths = Vec::with_capacity(self.points.len());
         for (i, point) in self.points.iter().enumerate() {
             if i > 0 {
                 travelled += (point.position - self.points[i - 1].position).norm();
             }
-            arc_length.push(travelled);
+            arc_lengths.push(travelled);
         }
+        arc_lengths
+    }
+
+    /// The curve with its per-point columns, ready for any curve file.
+    pub fn curve_table(&self) -> CurveTable {
         let column = |name: &str, unit: &str, value: fn(&CurvePoint) -> f64| Column {
             name: name.to_owned(),
             unit: unit.to_owned(),
@@ -63,7 +84,7 @@ impl Reconstruction {
         let arc_length = Column {
             name: "arc_length".to_owned(),
             unit: self.unit.label().to_owned(),
-            values: arc_length,
+            values: self.arc_lengths(),
         };
         let flags = self.along_epipolar_line.iter().map(|f| f64::from(u8::from(*f))).collect();
         let mut columns = vec![

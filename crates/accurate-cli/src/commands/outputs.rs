@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use accurate3d::io::{is_curve_file, write_curve, write_json};
+use accurate3d::io::{is_curve_file, remove_unfinished, write_curve, write_json};
 use accurate3d::{Provenance, Reconstruction, ViewPair, picture_svg, report_html};
 use serde_json::Value;
 
@@ -84,6 +84,8 @@ impl Outputs {
     ) -> Result<(), Failure> {
         if let Some(folder) = &self.folder {
             make_folder(folder)?;
+            // What a run that was killed while writing left here.
+            remove_unfinished(folder)?;
             write_one(&folder.join("curve.csv"), pair, reconstruction, result)?;
             for extra in &self.extras {
                 write_one(&folder.join(extra.file_name()), pair, reconstruction, result)?;

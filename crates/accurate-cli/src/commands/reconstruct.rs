@@ -146,6 +146,7 @@ fn one(
     };
     let mut params = Params::new(args.input, args.method);
     params.robust.calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
+    params.closure = args.closed;
     let reconstruction = reconstruct(&pair, &params)?;
     let mut result = result_json(dir, parts, &pair, &params, &reconstruction)?;
     if let Some(segmenter) = segmenter {
@@ -194,6 +195,7 @@ pub fn result_json(
         "points": reconstruction.points.len(),
         "length": reconstruction.length(),
         "diagnostics": reconstruction.diagnostics,
+        "stretches_along_epipolar_lines": reconstruction.weak_stretches(),
         "scores": scores,
         "parameters": parameters,
         "inputs": inputs,

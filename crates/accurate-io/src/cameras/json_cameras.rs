@@ -82,7 +82,7 @@ fn number(path: &Path, map: &Map<String, Value>, key: &str) -> Result<f64, IoErr
 
 fn pixels(path: &Path, map: &Map<String, Value>, key: &str) -> Result<u32, IoError> {
     let value = number(path, map, key)?;
-    if value >= 1.0 && value <= 1e6 && value.fract() == 0.0 {
+    if (1.0..=1e6).contains(&value) && value.fract() == 0.0 {
         Ok(value as u32)
     } else {
         Err(IoError::field(path, key, value.to_string(), "expected a whole number of px"))

@@ -78,7 +78,7 @@ pub(crate) fn read_npy(path: &Path, defaults: &ViewDefaults) -> Result<Vec<Named
 }
 
 fn views(path: &Path, values: &[f64], defaults: &ViewDefaults) -> Result<Vec<NamedView>, IoError> {
-    if values.is_empty() || values.len() % 12 != 0 {
+    if values.is_empty() || !values.len().is_multiple_of(12) {
         let reason = format!("{} rows of 4; expected a multiple of 3", values.len() / 4);
         return Err(IoError::malformed(path, FORMAT, None, reason));
     }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::score::Candidate;
 use super::shape::px_per_unit;
 
-/// A reason to doubt a reconstruction from masks.
+/// A reason to doubt a reconstruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -26,6 +26,8 @@ pub enum Suspicion {
     Uncovered,
     /// The curve is weakly seen somewhere, as along epipolar lines.
     Uncertain,
+    /// Ordered points were matched, but the match is no basis for an adjustment.
+    NotAdjusted,
 }
 
 /// Thresholds of the reasons, chosen on 300 generated pairs (seeds 1021 to 1025, `carm`, `medium` with
@@ -85,6 +87,7 @@ impl fmt::Display for Suspicion {
             Self::Ambiguous => "ambiguous order",
             Self::ViewsDisagree => "views disagree",
             Self::Uncovered => "skeleton not covered",
+            Self::NotAdjusted => "match not adjusted",
         })
     }
 }
