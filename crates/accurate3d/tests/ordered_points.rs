@@ -5,7 +5,8 @@ use accurate3d::eval::curve_scores;
 use accurate3d::fit::CalibrationPriors;
 use accurate3d::geom::nalgebra::{Matrix3, Rotation3, Vector3};
 use accurate3d::geom::{Camera, ImageSize, LengthUnit, Pixel, Point3, Rig, View};
-use accurate3d::synth::{CaseOptions, Family, SynthCase, generate};
+use accurate3d::io::OrderedPoints;
+use accurate3d::synth::{CalibrationError, CaseOptions, Family, SynthCase, generate};
 use accurate3d::{
     Closure, Error, InputKind, Method, Params, Reconstruction, ViewPair, reconstruct,
 };
@@ -49,13 +50,9 @@ fn seen<V: View>(camera: &Camera, points: &[Point3], whole: bool) -> Vec<Pixel<V
     seen
 }
 
-fn pair(
-    rig: &Rig,
-    points: Option<(Vec<Pixel<accurate3d::geom::View1>>, Vec<Pixel<accurate3d::geom::View2>>)>,
-    masks: Option<[Array2<bool>; 2]>,
-) -> ViewPair {
+fn pair(rig: &Rig, points: Option<OrderedPoints>, masks: Option<[Array2<bool>; 2]>) -> ViewPair {
     let id = "ordered-points".to_owned();
-    ViewPair { id, rig: rig.clone(), points, masks, images: None, truth: None }
+    ViewPair { id, rig: rig.clone(), points, masks, images: None, probabilities: None, truth: None }
 }
 
 fn accurate(pair: &ViewPair, input: InputKind) -> Result<Reconstruction, Error> {
@@ -132,7 +129,8 @@ fn per_px(case: &SynthCase) -> f64 {
 /// shifts along them is not, and the posterior says so.
 #[test]
 fn a_shift_of_image_2_is_estimated_from_ordered_points_where_it_can_be_seen() {
-    let options = CaseOptions { calibration_shift_px: 0.6, ..CaseOptions::default() };
+    let error = CalibrationError { rotation_deg: 0.0, shift_px: 0.6 };
+    let options = CaseOptions { calibration_error: Some(error), ..CaseOptions::default() };
     let mut seen = 0;
     for index in 0..4 {
         let case = generate(Family::Medium, SEED, index, &options).unwrap();

@@ -42,8 +42,8 @@ impl MatchedPart {
         };
         let (mut range1, mut range2) = (matched.matched1.clone(), turned(&matched.matched2));
         let end = |left1: usize, left2: usize| match left1.max(left2) {
-            0..=TIP_POINTS => End::Tip,
-            0..=DOUBTFUL_POINTS => End::Doubtful,
+            left if left <= TIP_POINTS => End::Tip,
+            left if left <= DOUBTFUL_POINTS => End::Doubtful,
             _ => End::Seam,
         };
         let ends = [end(range1.start, range2.start), end(count1 - range1.end, count2 - range2.end)];
@@ -142,7 +142,8 @@ mod tests {
     #[test]
     fn a_gap_is_not_filled() {
         let pairs = [(0, 0), (2, 2), (12, 3), (14, 5)];
-        let all = filled(&pairs, &[vec![3..12], vec![]]);
+        let gap = std::iter::once(3..12).collect();
+        let all = filled(&pairs, &[gap, vec![]]);
         assert_eq!(all, [(0, 0), (1, 1), (2, 2), (12, 3), (13, 4), (14, 5)]);
     }
 }
