@@ -413,7 +413,7 @@ pub struct SynthArgs {
     #[command(subcommand)]
     pub images: Option<SynthCommand>,
     #[command(flatten)]
-    pub cases: Option<CasesArgs>,
+    pub cases: CasesArgs,
 }
 
 #[derive(Debug, Subcommand)]
@@ -425,7 +425,9 @@ pub enum SynthCommand {
 #[derive(Debug, Args)]
 pub struct CasesArgs {
     /// The family of curves.
-    pub family: Family,
+    // `xray` does without: required unless that command is given.
+    #[arg(required = true)]
+    pub family: Option<Family>,
     /// How many cases.
     #[arg(short = 'n', long, default_value_t = 10)]
     pub count: u64,
@@ -436,8 +438,8 @@ pub struct CasesArgs {
     #[arg(short, long, default_value_t = 0)]
     pub seed: u64,
     /// Folder for case_000, case_001, ...
-    #[arg(short, long, value_name = "DIR")]
-    pub out: PathBuf,
+    #[arg(short, long, value_name = "DIR", required = true)]
+    pub out: Option<PathBuf>,
     /// Which ordered points to write.
     #[arg(long, value_enum, default_value_t = PointsKind::Rounded)]
     pub points: PointsKind,

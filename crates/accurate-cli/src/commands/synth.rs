@@ -1,6 +1,8 @@
+use std::path::Path;
+
 use accurate3d::io::{BitDepth, GreyImage, PairContents, write_pair};
 use accurate3d::synth::{
-    CalibrationError, CaseOptions, SynthCase, XrayOptions, generate, render_xray,
+    CalibrationError, CaseOptions, Family, SynthCase, XrayOptions, generate, render_xray,
 };
 use rayon::prelude::*;
 
@@ -11,15 +13,20 @@ use crate::failure::Failure;
 
 /// `accurate synth`: pair folders of a family, or single X-ray images.
 pub fn run(args: &SynthArgs, console: &Console) -> Result<(), Failure> {
-    match (&args.images, &args.cases) {
-        (Some(SynthCommand::Xray(xray)), _) => xray::run(xray, console),
-        (None, Some(cases)) => generate_cases(cases, console),
-        (None, None) => Err(Failure::new(Failure::USAGE, "a family or `xray` is missing")),
+    match (&args.images, args.cases.family, &args.cases.out) {
+        (Some(SynthCommand::Xray(xray)), _, _) => xray::run(xray, console),
+        (None, Some(family), Some(out)) => generate_cases(family, out, &args.cases, console),
+        _ => Err(Failure::new(Failure::USAGE, "a family and --out, or `xray`, are missing")),
     }
 }
 
 /// One pair folder a case.
-fn generate_cases(args: &CasesArgs, console: &Console) -> Result<(), Failure> {
+fn generate_cases(
+    family: Family,
+    out: &Path,
+    args: &CasesArgs,
+    console: &Console,
+) -> Result<(), Failure> {
     let options = case_options(&args.disturbances);
     let bar = console.progress(args.count as usize, "generating");
     let last = args
@@ -27,15 +34,15 @@ fn generate_cases(args: &CasesArgs, console: &Console) -> Result<(), Failure> {
         .checked_add(args.count)
         .ok_or_else(|| Failure::new(Failure::USAGE, "--first plus --count is too large"))?;
     (args.first..last).into_par_iter().try_for_each(|index| {
-        let case = generate(args.family, args.seed, index, &options)?;
+        let case = generate(family, args.seed, index, &options)?;
         let images = args.xray.then(|| xray_images(&case));
-        let dir = args.out.join(format!("case_{index:03}"));
+        let dir = out.join(format!("case_{index:03}"));
         write_pair(&dir, &contents_of(case, args.points, images))?;
         bar.inc(1);
         Ok::<(), Failure>(())
     })?;
     bar.finish_and_clear();
-    console.remark(&format!("{} cases of {} in {}", args.count, args.family, args.out.display()));
+    console.remark(&format!("{} cases of {} in {}", args.count, family, out.display()));
     Ok(())
 }
 
