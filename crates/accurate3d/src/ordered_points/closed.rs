@@ -19,21 +19,6 @@ pub(crate) struct Ring<'a> {
 /// Fewest points of a closed curve: with less there is no ring to speak of.
 const FEWEST: usize = 12;
 
-/// Whether the last point leads back to the first: no farther than two steps, or 2 px.
-///
-/// Where this holds in both views, so it does in space, whatever the correspondence: the two ends lie
-/// on the same two rays.
-pub(crate) fn meets_itself<V: View>(points: &[Pixel<V>]) -> bool {
-    let mut steps: Vec<f64> = points.windows(2).map(|w| w[0].distance(w[1])).collect();
-    steps.sort_unstable_by(f64::total_cmp);
-    match (points.first(), points.last()) {
-        (Some(first), Some(last)) if points.len() >= FEWEST => {
-            first.distance(*last) <= f64::max(2.0, 2.0 * steps[steps.len() / 2])
-        }
-        _ => false,
-    }
-}
-
 /// Matched around, and fitted as an open curve that goes once around and [`OVERLAP_PX`] more on both
 /// sides: what is kept, in the middle, does not feel where it was cut. The last point repeats the
 /// first.
@@ -205,6 +190,12 @@ impl Around {
             let Ok((pixel1, pixel2)) = rig.project(&position) else { continue };
             points.push(CurvePoint { position, pixel1, pixel2, epipolar_distance_px: 0.0 });
             covariances.push(self.fit.covariance.at(place));
+        }
+        // The blend ends on the first point up to rounding; a closed curve ends on it exactly.
+        if let Some(first) = points.first().cloned()
+            && let Some(last) = points.last_mut()
+        {
+            *last = first;
         }
         (points, covariances)
     }

@@ -6,7 +6,7 @@ use accurate_fit::{FitError, PointFit, PointFitParams, fit_points};
 use accurate_geom::{Pixel, Rig, View, View1, View2};
 use accurate_match::{FreeMatch, FreeMatchParams, FreeMatcher, TangencyParams};
 
-pub(crate) use closed::{Ring, closed_points, meets_itself};
+pub(crate) use closed::{Ring, closed_points};
 use part::{End, MatchedPart};
 use starts::smoothed_pairs;
 
@@ -27,12 +27,7 @@ pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Recons
         .points
         .as_ref()
         .ok_or_else(|| Error::MissingInput { case: case(), input: params.input })?;
-    let closed = match params.closure {
-        Closure::Open => false,
-        Closure::Closed => true,
-        Closure::Auto => meets_itself(points1) && meets_itself(points2),
-    };
-    if closed {
+    if params.closure == Closure::Closed {
         let ring = Ring { points1, points2, coverage: [1.0; 2] };
         return closed_points(pair, params, &ring);
     }
