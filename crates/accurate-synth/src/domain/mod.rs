@@ -36,7 +36,7 @@ use target::Target;
 use wander::log_uniform;
 
 /// Changes whenever [`draw_xray`] gives other images for the same arguments.
-pub const XRAY_VERSION: u32 = 1;
+pub const XRAY_VERSION: u32 = 2;
 
 /// Ranges that an image is drawn from. The default is what the shipped network is trained on.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,9 +48,10 @@ pub struct XrayDomain {
     /// Optical depth across the wire's shaft, drawn uniform in its logarithm; within 0.01 to 10. A
     /// wire that the noise would hide (see `least_contrast_to_noise`) is made denser.
     pub wire_depth: RangeInclusive<f64>,
-    /// Least contrast to noise per pixel times the square root of the width in px, 0 to 100: what
-    /// an eye can just follow along a line. A target below it would be a label that nobody can
-    /// check.
+    /// Least contrast to noise per pixel times the square root of the width in px, 0 to 100. Rose's
+    /// criterion asks for a signal of five deviations of the noise; over 5 px of wire (what a
+    /// tolerance of 2 px to both sides resolves) that is `5 / sqrt(5)`. A target below it would be a
+    /// label that nobody can check.
     pub least_contrast_to_noise: f64,
     /// Photons of an open pixel, drawn uniform in the logarithm; within 1 to 1e6.
     pub dose_photons_per_px: RangeInclusive<f64>,
@@ -84,7 +85,7 @@ impl Default for XrayDomain {
             side_px: 512,
             width_px: 1.0..=8.0,
             wire_depth: 0.06..=1.8,
-            least_contrast_to_noise: 1.0,
+            least_contrast_to_noise: 2.25,
             dose_photons_per_px: 30.0..=6000.0,
             blur_sigma_px: 0.2..=1.8,
             background: 0.1..=1.5,
