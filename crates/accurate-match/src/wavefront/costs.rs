@@ -127,7 +127,12 @@ fn take<const K: usize, S: Lanes>(
     first: usize,
     at: usize,
 ) -> [S::f64s; K] {
-    std::array::from_fn(|k| simd.load(&from[first + k], at))
+    // A loop, not `from_fn`: a closure would not be compiled for the vectors of `S`.
+    let mut taken = [simd.splat_f64s(0.0); K];
+    for k in 0..K {
+        taken[k] = simd.load(&from[first + k], at);
+    }
+    taken
 }
 
 #[derive(Debug, Clone, Copy)]

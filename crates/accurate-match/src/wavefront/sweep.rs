@@ -110,8 +110,10 @@ impl<S: Lanes> Sweep<'_, S> {
             record.bits.resize(offset + most_steps * step_bytes, 0);
         }
 
-        let rows: [C::Rows; VECTORS] =
-            std::array::from_fn(|v| C::rows(simd, columns, edge.row + v * S::F64_LANES));
+        let mut rows = [C::rows(simd, columns, edge.row); VECTORS];
+        for v in 1..VECTORS {
+            rows[v] = C::rows(simd, columns, edge.row + v * S::F64_LANES);
+        }
         // Before its first column a row is infinite, and stays so: what it sees is infinite.
         let infinite = simd.splat_f64s(f64::INFINITY);
         let mut now = [infinite; VECTORS];
@@ -154,9 +156,10 @@ impl<S: Lanes> Sweep<'_, S> {
             }
             if t.is_multiple_of(LOOK_EVERY) && first + t >= edge.live.end && first + t < n2 && t > 0
             {
-                let all = (0..VECTORS).fold(infinite, |least, v| {
-                    simd.min_f64s(least, simd.min_f64s(now[v], above_before[v]))
-                });
+                let mut all = infinite;
+                for v in 0..VECTORS {
+                    all = simd.min_f64s(all, simd.min_f64s(now[v], above_before[v]));
+                }
                 if simd.reduce_min_f64s(all) > bound {
                     taken = t + 1;
                     break;
