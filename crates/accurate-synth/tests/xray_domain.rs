@@ -27,6 +27,37 @@ fn nearest(sample: &XraySample, x: f64, y: f64) -> Option<(f64, f64)> {
 }
 
 #[test]
+fn pictures_of_pairs_show_the_wire_where_the_labels_are() {
+    let domain = XrayDomain { side_px: 256, pair_probability: 1.0, ..XrayDomain::default() };
+    for index in 0..8 {
+        let sample = draw_xray(&domain, 1500, index).unwrap();
+        let mean = |wanted: bool| {
+            let near = |row: usize, column: usize| sample.tube[[row, column]];
+            let values: Vec<f64> = sample
+                .image
+                .indexed_iter()
+                .filter(|((row, column), _)| {
+                    // The ring of 6 px around the wire against the wire itself.
+                    let around = (row.saturating_sub(6)..(row + 7).min(256)).any(|r| {
+                        (column.saturating_sub(6)..(column + 7).min(256)).any(|c| near(r, c))
+                    });
+                    if wanted {
+                        sample.mask[[*row, *column]]
+                    } else {
+                        around && !sample.mask[[*row, *column]]
+                    }
+                })
+                .map(|(_, value)| f64::from(*value))
+                .collect();
+            assert!(values.len() > 100, "image {index}: {} px", values.len());
+            values.iter().sum::<f64>() / values.len() as f64
+        };
+        let darker = mean(false) - mean(true);
+        assert!(if sample.inverted { darker < 0.0 } else { darker > 0.0 }, "{index}: {darker}");
+    }
+}
+
+#[test]
 fn labels_are_the_tube_around_the_projected_centreline() {
     let mut labelled = 0;
     for index in 0..12 {
@@ -120,6 +151,7 @@ fn bad_ranges_are_named() {
         ("jpeg_quality", XrayDomain { jpeg_quality: 0..=50, ..small() }),
         ("empty_probability", XrayDomain { empty_probability: 1.1, ..small() }),
         ("least_contrast_to_noise", XrayDomain { least_contrast_to_noise: -1.0, ..small() }),
+        ("pair_probability", XrayDomain { pair_probability: 1.5, ..small() }),
     ];
     for (expected, domain) in bad {
         match draw_xray(&domain, 0, 0) {

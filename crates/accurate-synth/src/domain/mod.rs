@@ -9,6 +9,7 @@ mod device;
 mod held_out;
 mod jpeg;
 mod label;
+mod of_pair;
 mod overlay;
 mod stroke;
 mod target;
@@ -36,7 +37,7 @@ use target::Target;
 use wander::log_uniform;
 
 /// Changes whenever [`draw_xray`] gives other images for the same arguments.
-pub const XRAY_VERSION: u32 = 2;
+pub const XRAY_VERSION: u32 = 3;
 
 /// Ranges that an image is drawn from. The default is what the shipped network is trained on.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +78,10 @@ pub struct XrayDomain {
     pub overlay_probability: f64,
     /// Probability of an image without a wire, 0 to 1.
     pub empty_probability: f64,
+    /// Probability of the picture of one view of a generated pair (`sim-paper`, `carm`, ...)
+    /// instead, 0 to 1. Of the other fields only `side_px` concerns it; where a family's images are
+    /// smaller than that, the image is an ordinary one.
+    pub pair_probability: f64,
 }
 
 impl Default for XrayDomain {
@@ -98,6 +103,7 @@ impl Default for XrayDomain {
             jpeg_quality: 25..=95,
             overlay_probability: 0.25,
             empty_probability: 0.03,
+            pair_probability: 0.25,
         }
     }
 }
@@ -127,6 +133,7 @@ impl XrayDomain {
             ("jpeg_probability", self.jpeg_probability),
             ("overlay_probability", self.overlay_probability),
             ("empty_probability", self.empty_probability),
+            ("pair_probability", self.pair_probability),
         ] {
             within(name, probability, 0.0..=1.0, "0 to 1")?;
         }
@@ -197,6 +204,12 @@ pub fn draw_xray(domain: &XrayDomain, seed: u64, index: u64) -> Result<XraySampl
     domain.check()?;
     let stream = |what: &str| named_rng("xray-domain", seed, index, what);
     let side = domain.side_px as usize;
+    let mut pair = stream("pair");
+    if pair.random_bool(domain.pair_probability)
+        && let Some(sample) = of_pair::draw(&mut pair, domain.side_px, seed, index)
+    {
+        return Ok(sample);
+    }
 
     let mut scene = stream("scene");
     let strength = scene.random_range(domain.background.clone());
