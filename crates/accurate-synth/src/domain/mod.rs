@@ -79,8 +79,7 @@ pub struct XrayDomain {
     /// Probability of an image without a wire, 0 to 1.
     pub empty_probability: f64,
     /// Probability of the picture of one view of a generated pair (`sim-paper`, `carm`, ...)
-    /// instead, 0 to 1. Of the other fields only `side_px` concerns it; where a family's images are
-    /// smaller than that, the image is an ordinary one.
+    /// instead, 0 to 1. Of the other fields only `side_px` concerns it.
     pub pair_probability: f64,
 }
 

@@ -26,7 +26,8 @@ const FAMILIES: [Family; 8] = [
 /// shape is the family's case `index` of set `seed`, which no evaluation shares (their seeds are
 /// below 2000).
 ///
-/// `None` if the family's images are smaller than the square.
+/// Where the family's images are smaller than the square, their last rows and columns go on.
+/// `None` only if no case can be drawn (not known to happen).
 pub(crate) fn draw(rng: &mut ChaCha8Rng, side: u32, seed: u64, index: u64) -> Option<XraySample> {
     let family = FAMILIES[rng.random_range(0..FAMILIES.len())];
     let width_px = log_uniform(rng, 1.0, 8.0);
@@ -50,11 +51,13 @@ pub(crate) fn draw(rng: &mut ChaCha8Rng, side: u32, seed: u64, index: u64) -> Op
     let picture = &render_xray(&case, &options)[view];
     let (rows, columns) = picture.dim();
     let square = side as usize;
-    let (free_rows, free_columns) = (rows.checked_sub(square)?, columns.checked_sub(square)?);
+    let (free_rows, free_columns) = (rows.saturating_sub(square), columns.saturating_sub(square));
     let middle = course.points.get(rng.random_range(0..course.points.len().max(1)))?;
     let corner = |at: f64, free: usize| ((at - f64::from(side) / 2.0).max(0.0) as usize).min(free);
     let (top, left) = (corner(middle.y, free_rows), corner(middle.x, free_columns));
-    let cut = Array2::from_shape_fn((square, square), |(y, x)| picture[[top + y, left + x]]);
+    let cut = Array2::from_shape_fn((square, square), |(y, x)| {
+        picture[[(top + y).min(rows - 1), (left + x).min(columns - 1)]]
+    });
     let inverted = rng.random_bool(0.2);
     let image = windowed(&cut, rng, inverted);
 
