@@ -324,12 +324,19 @@ pub struct ReproduceArgs {
     /// Cases per seed; the paper's simulation test split has 26.
     #[arg(long, default_value_t = 26)]
     pub cases: u64,
+    /// Cases per seed of the image rows, which take seconds each; 0 leaves them out.
+    #[arg(long, default_value_t = 4)]
+    pub image_cases: u64,
+    #[command(flatten)]
+    pub model: ModelArgs,
 }
 
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
     /// Folder that `accurate reproduce` wrote.
     pub dir: PathBuf,
+    #[command(flatten)]
+    pub model: ModelArgs,
 }
 
 #[derive(Debug, Args)]
@@ -588,8 +595,16 @@ pub struct TableArgs {
     pub refine_calibration: bool,
     /// Instead of a table: measure every cell of this file and compare it with its accepted
     /// interval.
-    #[arg(long, value_name = "CELLS.csv", exclusive = true)]
+    #[arg(long, value_name = "CELLS.csv", conflicts_with_all = [
+        "set", "method", "input", "seeds", "cases", "points", "scores", "format", "out",
+        "refine_calibration", "mask_thickness_px", "occlusions", "occlusion_radius_px",
+        "calibration_rotation_deg", "calibration_shift_px",
+    ])]
     pub check: Option<PathBuf>,
+    /// With --check: set the accepted intervals of this row's cells to what was measured and write
+    /// the file again.
+    #[arg(long, value_name = "ROW", requires = "check")]
+    pub accept: Option<String>,
     #[command(flatten)]
     pub disturbances: Disturbances,
     #[command(flatten)]

@@ -14,7 +14,8 @@ use crate::code::Code;
 use crate::console::Console;
 use crate::failure::Failure;
 
-/// The model that is used without `--model`, where one is built in.
+/// The model that is used without `--model`, where one is built in. Nothing reads it before it is
+/// asked for.
 #[cfg(feature = "embedded-model")]
 const EMBEDDED: Option<&[u8]> = Some(include_bytes!("../../../models/wire.accmodel"));
 #[cfg(not(feature = "embedded-model"))]

@@ -472,6 +472,38 @@ fn images_say_that_no_network_is_installed() {
     assert!(message.contains("no segmentation network is installed"), "{message}");
 }
 
+#[cfg(feature = "embedded-model")]
+#[test]
+fn images_need_no_set_up() {
+    let dir = TempDir::new().unwrap();
+    let info: Value =
+        serde_json::from_str(&stdout(accurate().args(["--json", "model", "info"]))).unwrap();
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/wire.accmodel");
+    let mut of_file = accurate();
+    of_file.args(["--json", "model", "info"]).arg(shipped);
+    assert_eq!(info, serde_json::from_str::<Value>(&stdout(&mut of_file)).unwrap());
+
+    let set = dir.path().join("set");
+    let mut synth = accurate();
+    synth.args(["synth", "easy", "--seed", "1000", "--count", "1", "--xray", "--out"]).arg(&set);
+    synth.assert().success();
+    let pair = fs::read_dir(&set).unwrap().map(|e| e.unwrap().path()).find(|p| p.is_dir()).unwrap();
+    let out = dir.path().join("out");
+    let mut run = accurate();
+    run.env_remove("ORT_DYLIB_PATH");
+    run.args(["--json", "reconstruct", "-i", "image", "-o"]).arg(&out).arg(&pair);
+    let result: Value = serde_json::from_str(&stdout(&mut run)).unwrap();
+    let by = result["parameters"]["segmentation"].as_str().unwrap();
+    assert!(by.contains(&info["blake3"].as_str().unwrap()[..12]) && by.contains("rten"), "{by}");
+    assert!(result["scores"]["overall"].is_number() && out.join("curve.csv").is_file());
+
+    let mut segment = accurate();
+    segment.env_remove("ORT_DYLIB_PATH");
+    segment.args(["segment", "-o"]).arg(&out).arg(pair.join("images/view_L.png"));
+    segment.assert().success();
+    assert!(out.join("view_L_mask.png").is_file());
+}
+
 #[test]
 fn images_are_segmented_and_reconstructed() {
     let dir = TempDir::new().unwrap();

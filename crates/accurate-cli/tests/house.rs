@@ -96,6 +96,48 @@ fn the_vocabulary_stays_light() {
     }
 }
 
+/// Everything that `accurate-geom`, `-traverse` and `-match` build with, whatever the features, has
+/// to be free of engines. Manifests of ours list what they take outside of tests, `Cargo.lock` what
+/// any feature of others could bring, so that this holds for every build.
+#[test]
+fn the_geometry_builds_without_engines() {
+    let lock: toml::Table =
+        fs::read_to_string(workspace().join("Cargo.lock")).unwrap().parse().unwrap();
+    let packages = lock["package"].as_array().unwrap();
+    let ours = crates();
+    let needs = |name: &str| -> Vec<String> {
+        if let Some(path) = ours.get(name) {
+            return dependencies(&path.join("Cargo.toml")).into_iter().collect();
+        }
+        packages
+            .iter()
+            .filter(|package| package["name"].as_str() == Some(name))
+            .filter_map(|package| package.get("dependencies")?.as_array())
+            .flatten()
+            // A name alone, or followed by version and source where there are several.
+            .filter_map(|needed| Some(needed.as_str()?.split(' ').next()?.to_owned()))
+            .collect()
+    };
+    let closure = |name: &str| {
+        let mut known = BTreeSet::from([name.to_owned()]);
+        let mut open = vec![name.to_owned()];
+        while let Some(next) = open.pop() {
+            open.extend(needs(&next).into_iter().filter(|needed| known.insert(needed.clone())));
+        }
+        known
+    };
+    const ENGINES: [&str; 5] = ["rten", "rten-tensor", "ort", "ort-sys", "prost"];
+    for name in ["accurate-geom", "accurate-traverse", "accurate-match"] {
+        let built = closure(name);
+        assert!(built.contains("nalgebra"), "{name} is not in Cargo.lock as this test reads it");
+        for engine in ENGINES {
+            assert!(!built.contains(engine), "{name} builds with {engine}");
+        }
+    }
+    let all = closure("accurate-cli");
+    assert!(ENGINES.iter().all(|engine| all.contains(*engine)), "an engine has another name now");
+}
+
 #[test]
 fn engines_stay_behind_the_features_of_one_crate() {
     const ENGINES: [&str; 4] = ["rten", "rten-tensor", "ort", "prost"];

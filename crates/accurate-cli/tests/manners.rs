@@ -145,16 +145,18 @@ fn completions_manual_and_schema_cover_every_command() {
 fn a_recorded_table_is_verified_and_a_changed_one_is_not() {
     let dir = TempDir::new().unwrap();
     let out = dir.path().join("table1");
-    let words = ["reproduce", "table1", "--seeds", "1000", "--cases", "1", "--out"];
+    let words =
+        ["reproduce", "table1", "--seeds", "1000", "--cases", "1", "--image-cases", "1", "--out"];
     stdout(accurate(&words).arg(&out));
-    for set in ["simulation", "phantom"] {
+    for set in ["simulation", "phantom", "simulation-images", "phantom-images"] {
         for format in ["md", "csv", "tex", "html", "json"] {
             assert!(out.join(format!("table1-{set}.{format}")).is_file());
         }
     }
     let manifest: Value =
         serde_json::from_str(&fs::read_to_string(out.join("manifest.json")).unwrap()).unwrap();
-    assert_eq!(manifest["files_blake3"].as_object().unwrap().len(), 10);
+    assert_eq!(manifest["files_blake3"].as_object().unwrap().len(), 20);
+    assert!(manifest["segmentation"].as_str().unwrap().contains("rten"));
     assert!(stdout(accurate(&["verify"]).arg(&out)).starts_with("verified"));
 
     let table = out.join("table1-phantom.md");

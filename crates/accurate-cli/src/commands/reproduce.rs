@@ -1,15 +1,20 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use accurate3d::NOT_FOR_CLINICAL_USE;
 use accurate3d::io::{hash_bytes, hash_file, write_json};
+use accurate3d::seg::Segmenter;
 use accurate3d::synth::{CaseOptions, Family};
-use accurate3d::table::{CaseSet, Format, Measuring, PointsProtocol, measure, paper_rows, render};
+use accurate3d::table::{
+    CaseSet, Format, Measuring, PointsProtocol, Row, image_cases as image_cases_of, measure,
+    paper_rows, render,
+};
+use accurate3d::{InputKind, NOT_FOR_CLINICAL_USE};
 use serde::{Deserialize, Serialize};
 
-use crate::args::{Experiment, ReproduceArgs};
+use crate::args::{Experiment, ModelArgs, ReproduceArgs};
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::segmentation::segmenter;
 use crate::text::{make_folder, write_text};
 
 /// The file that says what a run was made with.
@@ -29,6 +34,10 @@ pub struct Manifest {
     pub seeds: Vec<u64>,
     /// Cases per seed.
     pub cases: u64,
+    /// Cases per seed of the image rows.
+    pub image_cases: u64,
+    /// What segmented the images; none without image rows.
+    pub segmentation: Option<String>,
     /// BLAKE3 of the cases of each set.
     pub data_blake3: BTreeMap<String, String>,
     /// BLAKE3 of every file beside the manifest.
@@ -40,7 +49,8 @@ pub struct Manifest {
 /// `accurate reproduce table1`: the paper's table on both sets in every format, and the manifest.
 pub fn run(args: &ReproduceArgs, console: &Console) -> Result<(), Failure> {
     let Experiment::Table1 = args.experiment;
-    let (manifest, files) = table1(&args.seeds, args.cases, console)?;
+    let size = Size { seeds: &args.seeds, cases: args.cases, image_cases: args.image_cases };
+    let (manifest, files) = table1(size, &args.model, console)?;
     make_folder(&args.out)?;
     for (name, text) in &files {
         write_text(&args.out.join(name), text)?;
@@ -60,17 +70,45 @@ pub fn run(args: &ReproduceArgs, console: &Console) -> Result<(), Failure> {
     Ok(())
 }
 
+/// How much of the experiment is run.
+#[derive(Debug, Clone, Copy)]
+pub struct Size<'a> {
+    /// Seeds of the generated sets.
+    pub seeds: &'a [u64],
+    /// Cases per seed.
+    pub cases: u64,
+    /// Cases per seed of the image rows.
+    pub image_cases: u64,
+}
+
 /// The files of the experiment by name, and what they were made with.
 pub fn table1(
-    seeds: &[u64],
-    cases: u64,
+    size: Size<'_>,
+    model: &ModelArgs,
     console: &Console,
 ) -> Result<(Manifest, BTreeMap<String, String>), Failure> {
+    let Size { seeds, cases, image_cases } = size;
     if seeds.is_empty() || cases == 0 {
         return Err(Failure::new(Failure::USAGE, "the experiment has no case")
             .with_hint("give at least one seed and one case"));
     }
+    let segmenter = match image_cases {
+        0 => None,
+        _ => Some(segmenter(model, console)?),
+    };
     let (mut files, mut data) = (BTreeMap::new(), BTreeMap::new());
+    let mut run = |name: String, set: &CaseSet, rows: &[Row], how: &Measuring<'_>| {
+        data.insert(name.clone(), set.fingerprint()?);
+        let bar = console.progress(set.len(), "measuring");
+        let table = measure(set, rows, how, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        for format in Format::ALL {
+            files.insert(format!("table1-{name}.{}", format.name()), render(&table, format));
+        }
+        Ok::<(), Failure>(())
+    };
+    let (of_images, others): (Vec<Row>, Vec<Row>) =
+        paper_rows().into_iter().partition(|row| row.input == InputKind::Image);
     for (name, family) in [("simulation", Family::SimPaper), ("phantom", Family::Carm)] {
         let set = CaseSet::Generated {
             family,
@@ -79,12 +117,10 @@ pub fn table1(
             cases,
             points: PointsProtocol::Rounded,
         };
-        data.insert(set.name(), set.fingerprint()?);
-        let bar = console.progress(set.len(), name);
-        let table = measure(&set, &paper_rows(), &Measuring::default(), &|| bar.inc(1))?;
-        bar.finish_and_clear();
-        for format in Format::ALL {
-            files.insert(format!("table1-{name}.{}", format.name()), render(&table, format));
+        run(name.to_owned(), &set, &others, &Measuring::default())?;
+        if let Some(segmenter) = &segmenter {
+            let (set, how) = image_cases_of(family, seeds, image_cases, segmenter);
+            run(format!("{name}-images"), &set, &of_images, &how)?;
         }
     }
     let manifest = Manifest {
@@ -93,6 +129,8 @@ pub fn table1(
         binary_blake3: binary_hash()?,
         seeds: seeds.to_vec(),
         cases,
+        image_cases,
+        segmentation: segmenter.map(|segmenter| segmenter.describe()),
         data_blake3: data,
         files_blake3: files
             .iter()

@@ -5,8 +5,8 @@ use accurate3d::io::{PairParts, Truth, find_pairs, read_pair};
 use accurate3d::seg::Segmenter;
 use accurate3d::synth::Family;
 use accurate3d::table::{
-    CaseSet, Measuring, Outcome, PointsProtocol, Row, check_case_count, check_cells, grid, measure,
-    paper_rows, parse_cells, render,
+    CaseSet, CellCheck, Measuring, Outcome, PointsProtocol, Row, accepted_around, check_case_count,
+    check_cells, grid, measure, need_images, paper_rows, parse_cells, render, write_cells,
 };
 use accurate3d::{InputKind, NOT_FOR_CLINICAL_USE, ViewPair};
 use comfy_table::Table as TerminalTable;
@@ -22,7 +22,7 @@ use crate::text::{read_text, write_text};
 /// `accurate table`: the paper's table on a set, or the check of its cells.
 pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
     if let Some(cells) = &args.check {
-        return check(cells, console);
+        return check(cells, args, console);
     }
     let set = case_set(args)?;
     if set.is_empty() {
@@ -125,39 +125,83 @@ fn path_has(set: &Path, part: &str) -> bool {
 }
 
 /// `accurate table --check`: every cell that can run, against its accepted interval.
-fn check(path: &Path, console: &Console) -> Result<(), Failure> {
-    let cells = parse_cells(&read_text(path)?).map_err(|problem| {
+fn check(path: &Path, args: &TableArgs, console: &Console) -> Result<(), Failure> {
+    let mut cells = parse_cells(&read_text(path)?).map_err(|problem| {
         Failure::new(Failure::BAD_INPUT, format!("{}: {problem}", path.display()))
     })?;
+    if let Some(row) = &args.accept {
+        cells.retain(|cell| cell.row == *row && !cell.method.is_empty());
+        if cells.is_empty() {
+            return Err(Failure::new(
+                Failure::USAGE,
+                format!("{}: no cell of the row `{row}` can run", path.display()),
+            ));
+        }
+    }
+    let segmenter = match need_images(&cells) {
+        true => Some(segmenter(&args.model, console)?),
+        false => None,
+    };
     let bar = console.progress(check_case_count(&cells), "measuring");
-    let checks = check_cells(&cells, None, &|| bar.inc(1))?;
+    let segmenter = segmenter.as_ref().map(|s| s as &dyn Segmenter);
+    let checks = check_cells(&cells, segmenter, &|| bar.inc(1))?;
     bar.finish_and_clear();
     if console.json {
         console.json(&checks)?;
     } else {
         for c in &checks {
-            let name = format!("{} {} {}", c.cell.row, c.cell.dataset, c.cell.metric);
-            let line = match (c.measured, c.cell.low, c.cell.high) {
-                (Some(value), Some(low), Some(high)) => format!(
-                    "{} {name}: {value:.4} in [{low}, {high}] (paper {})",
-                    if c.accepted { "ok  " } else { "FAIL" },
-                    c.cell.paper
-                ),
-                (None, Some(_), _) => format!("FAIL {name}: nothing was measured"),
-                _ => format!("n/a  {name}: {} (paper {})", c.cell.command, c.cell.paper),
-            };
-            console.data(&line)?;
+            console.data(&line_of(c))?;
         }
     }
     let ran = checks.iter().filter(|c| c.measured.is_some()).count();
+    if ran == 0 {
+        return Err(Failure::new(Failure::BAD_INPUT, "no cell could be measured"));
+    }
+    if args.accept.is_some() {
+        return accept(path, &checks, console);
+    }
     let failed = checks.iter().filter(|c| !c.accepted).count();
     console.remark(&format!("{} cells: {ran} measured, {failed} outside", checks.len()));
-    match (ran, failed) {
-        (_, 1..) => Err(Failure::new(
+    if failed > 0 {
+        return Err(Failure::new(
             Code::CellsOutside,
             format!("{failed} cells lie outside their accepted intervals"),
-        )),
-        (0, _) => Err(Failure::new(Failure::BAD_INPUT, "no cell could be measured")),
-        _ => Ok(()),
+        ));
     }
+    Ok(())
+}
+
+fn line_of(c: &CellCheck) -> String {
+    let name = format!("{} {} {} {}", c.cell.row, c.cell.dataset, c.cell.metric, c.cell.method);
+    match (c.measured, c.cell.low, c.cell.high) {
+        (Some(value), Some(low), Some(high)) => format!(
+            "{} {name}: {value:.4} in [{low}, {high}] (paper {}){}",
+            if c.accepted { "ok  " } else { "FAIL" },
+            c.cell.paper,
+            match c.failures {
+                0 => String::new(),
+                failures => format!(", {failures} cases failed"),
+            }
+        ),
+        (None, Some(_), _) => format!("FAIL {name}: nothing was measured"),
+        _ => format!("n/a  {name}: {} (paper {})", c.cell.command, c.cell.paper),
+    }
+}
+
+/// `--accept`: the measured values become the accepted ones; everything else stays as it is.
+fn accept(path: &Path, checks: &[CellCheck], console: &Console) -> Result<(), Failure> {
+    let bad = |problem: String| {
+        Failure::new(Failure::BAD_INPUT, format!("{}: {problem}", path.display()))
+    };
+    let mut cells = parse_cells(&read_text(path)?).map_err(bad)?;
+    for cell in &mut cells {
+        let Some(check) = checks.iter().find(|check| check.cell == *cell) else { continue };
+        let value = check
+            .measured
+            .ok_or_else(|| bad(format!("nothing was measured for {} {}", cell.row, cell.metric)))?;
+        [cell.low, cell.high] = accepted_around(value).map(Some);
+    }
+    write_text(path, &write_cells(&cells).map_err(bad)?)?;
+    console.remark(&format!("{} intervals set in {}", checks.len(), path.display()));
+    Ok(())
 }

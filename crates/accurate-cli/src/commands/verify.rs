@@ -1,7 +1,7 @@
 use accurate3d::io::hash_file;
 use serde_json::json;
 
-use super::reproduce::{MANIFEST, Manifest, table1};
+use super::reproduce::{MANIFEST, Manifest, Size, table1};
 use crate::args::VerifyArgs;
 use crate::code::Code;
 use crate::console::Console;
@@ -21,8 +21,18 @@ pub fn run(args: &VerifyArgs, console: &Console) -> Result<(), Failure> {
             format!("{}: unknown experiment `{}`", path.display(), manifest.experiment),
         ));
     }
-    let (again, _) = table1(&manifest.seeds, manifest.cases, console)?;
+    let Manifest { seeds, cases, image_cases, .. } = &manifest;
+    let size = Size { seeds, cases: *cases, image_cases: *image_cases };
+    let (again, _) = table1(size, &args.model, console)?;
     let mut problems = Vec::new();
+    if again.segmentation != manifest.segmentation {
+        let said = |text: &Option<String>| text.clone().unwrap_or_else(|| "nothing".to_owned());
+        problems.push(format!(
+            "the images were segmented by {}, now by {}",
+            said(&manifest.segmentation),
+            said(&again.segmentation)
+        ));
+    }
     for (set, hash) in &manifest.data_blake3 {
         if again.data_blake3.get(set) != Some(hash) {
             problems.push(format!("the cases of {set} are others"));
