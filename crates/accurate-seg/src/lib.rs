@@ -26,6 +26,7 @@
 //! # Ok::<(), accurate_seg::SegError>(())
 //! ```
 
+mod bit_image;
 mod components;
 mod distance;
 mod error;
@@ -38,6 +39,8 @@ mod skeleton;
 mod spurs;
 mod thin;
 mod thin_rules;
+#[cfg(test)]
+mod thin_tables;
 mod threshold;
 
 pub use components::{Components, keep_largest, remove_smaller_than};

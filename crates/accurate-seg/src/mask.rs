@@ -133,10 +133,20 @@ impl Mask {
         Self { pixels: view.as_standard_layout().into_owned() }
     }
 
+    /// Nothing but background, in the size of this mask.
+    pub(crate) fn cleared(&self) -> Self {
+        Self { pixels: Array2::from_elem(self.shape(), false) }
+    }
+
     /// All pixels in raster order.
     pub(crate) fn raster(&self) -> &[bool] {
         // The layout is standard by construction, so there is always a slice.
         self.pixels.as_slice().unwrap_or_default()
+    }
+
+    /// All pixels in raster order.
+    pub(crate) fn raster_mut(&mut self) -> &mut [bool] {
+        self.pixels.as_slice_mut().unwrap_or_default()
     }
 
     /// The same size with the pixels for which `keep(index in raster order)` holds.
