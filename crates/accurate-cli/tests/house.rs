@@ -35,7 +35,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
 ];
 
 /// Third-party crates that `accurate-geom` may take: the vocabulary stays light.
-const GEOM_TAKES: &[&str] = &["nalgebra", "thiserror", "serde"];
+const GEOM_TAKES: &[&str] = &["nalgebra", "pulp", "thiserror", "serde"];
 
 /// Crates that open no file, print nothing and read no clock.
 const PURE: &[&str] = &[

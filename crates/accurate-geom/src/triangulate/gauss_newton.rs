@@ -1,8 +1,9 @@
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 
 use super::dlt;
+use super::solution::Solution;
 use super::two_view::{PinholeView, TwoView};
-use crate::{GeomError, Point2};
+use crate::GeomError;
 
 const MAX_STEPS: usize = 60;
 
@@ -11,10 +12,13 @@ const MAX_STEPS: usize = 60;
 ///
 /// # Source
 /// Hartley and Sturm, Triangulation, CVIU 68(2), 1997, equation 2 (the cost).
-pub(super) fn solve(g: &TwoView, p1: &Point2, p2: &Point2) -> Result<Vector3<f64>, GeomError> {
-    let mut x = dlt::solve(g, p1, p2)?;
+pub(super) fn solve(g: &TwoView, p1: &[f64; 2], p2: &[f64; 2]) -> Result<Solution<f64>, GeomError> {
+    let start = dlt::solve(g, p1, p2)?;
+    let mut x = Vector3::from(start.position);
+    let (p1, p2) = (&Point2::from(*p1), &Point2::from(*p2));
+    // At infinity, or in the principal plane of a camera: no image, nothing to improve.
     let Some(mut system) = System::at(g, &x, p1, p2) else {
-        return Ok(x); // in the principal plane of a camera: no image, nothing to improve
+        return Ok(start);
     };
     let mut damping = 0.0;
     for _ in 0..MAX_STEPS {
@@ -40,7 +44,7 @@ pub(super) fn solve(g: &TwoView, p1: &Point2, p2: &Point2) -> Result<Vector3<f64
             break;
         }
     }
-    Ok(x)
+    Ok(Solution { position: x.into(), ..start })
 }
 
 /// Normal equations of one linearisation.
@@ -52,7 +56,7 @@ struct System {
 
 impl System {
     /// `None` where a projection does not exist or overflows.
-    fn at(g: &TwoView, x: &Vector3<f64>, p1: &Point2, p2: &Point2) -> Option<Self> {
+    fn at(g: &TwoView, x: &Vector3<f64>, p1: &Point2<f64>, p2: &Point2<f64>) -> Option<Self> {
         let mut system = Self { cost: 0.0, gradient: Vector3::zeros(), hessian: Matrix3::zeros() };
         for (view, p) in [(&g.view1, p1), (&g.view2, p2)] {
             system.add(view, x, p);
@@ -60,7 +64,7 @@ impl System {
         (system.cost.is_finite() && system.hessian.iter().all(|v| v.is_finite())).then_some(system)
     }
 
-    fn add(&mut self, view: &PinholeView, x: &Vector3<f64>, p: &Point2) {
+    fn add(&mut self, view: &PinholeView, x: &Vector3<f64>, p: &Point2<f64>) {
         let m = &view.pixel_from_direction;
         let h = m * (x - view.centre);
         let image = Vector2::new(h.x / h.z, h.y / h.z);

@@ -1,26 +1,34 @@
-use nalgebra::Vector3;
-
-use super::Triangulator;
+use super::method::Method;
+use super::number::{Number, add_scaled, constant, cross, dot, scaled};
+use super::solution::Solution;
 use super::two_view::TwoView;
-use crate::{GeomError, Point2};
 
 /// Midpoint of the shortest segment between the two rays.
 ///
 /// # Source
 /// Hartley and Sturm, Triangulation, CVIU 68(2), 1997, section 4.
-pub(super) fn solve(g: &TwoView, p1: &Point2, p2: &Point2) -> Result<Vector3<f64>, GeomError> {
-    let (d1, d2) = (g.view1.unit_ray(p1), g.view2.unit_ray(p2));
-    let normal = d1.cross(&d2);
-    let sine_squared = normal.norm_squared();
-    let sine = sine_squared.sqrt();
-    if !(sine >= Triangulator::LEAST_SINE) {
-        return Err(GeomError::ParallelRays { sine, least: Triangulator::LEAST_SINE });
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Midpoint;
+
+impl Method for Midpoint {
+    #[inline(always)]
+    fn solve<N: Number>(g: &TwoView, p1: &[N; 2], p2: &[N; 2]) -> Solution<N> {
+        let (d1, d2) = (g.view1.bounded_ray(p1), g.view2.bounded_ray(p2));
+        let normal = cross(&d1, &d2);
+        let normal_2 = dot(&normal, &normal);
+        // Feet of the common perpendicular. Triple products keep their relative accuracy for small
+        // angles, where 1 - (d1·d2)² would cancel.
+        let baseline = constant(p1[0], &g.baseline.into());
+        let depth1 = dot(&cross(&baseline, &d2), &normal) / normal_2;
+        let depth2 = dot(&cross(&baseline, &d1), &normal) / normal_2;
+        let foot1 = add_scaled(&g.view1.centre_as(p1[0]), depth1, &d1);
+        let foot2 = add_scaled(&g.view2.centre_as(p1[0]), depth2, &d2);
+        let half = p1[0].all(0.5);
+        Solution {
+            position: scaled(half, &add_scaled(&foot1, half.all(1.0), &foot2)),
+            sine: (normal_2 / (dot(&d1, &d1) * dot(&d2, &d2))).sqrt(),
+            weight: half.all(1.0),
+            open: half.all(0.0),
+        }
     }
-    // Feet of the common perpendicular. Triple products keep their relative accuracy for small
-    // angles, where 1 - (d1·d2)² would cancel.
-    let depth1 = g.baseline.cross(&d2).dot(&normal) / sine_squared;
-    let depth2 = g.baseline.cross(&d1).dot(&normal) / sine_squared;
-    let foot1 = g.view1.centre + depth1 * d1;
-    let foot2 = g.view2.centre + depth2 * d2;
-    Ok(0.5 * (foot1 + foot2))
 }

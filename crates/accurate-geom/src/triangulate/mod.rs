@@ -1,14 +1,22 @@
+mod batch;
 mod dlt;
 mod gauss_newton;
 mod lindstrom;
+mod method;
 mod midpoint;
+mod number;
+mod solution;
 mod two_view;
 
 use std::fmt;
 use std::str::FromStr;
 
-use crate::error::finite;
 use crate::{GeomError, Pixel, Point3, Rig, View1, View2};
+use dlt::Dlt;
+use lindstrom::LindstromNiter2;
+use method::Method;
+use midpoint::Midpoint;
+use solution::{Finding, check_pixels};
 use two_view::TwoView;
 
 /// How a pair of pixels becomes a 3D point. All four agree on exact data.
@@ -104,31 +112,37 @@ impl Triangulator {
     /// [`Triangulation::Dlt`] fails.
     ///
     /// # Cost
-    /// O(1): 0.1 to 0.2 µs for midpoint and Lindstrom, 2 to 4 µs for the other two.
+    /// O(1): about 0.1 µs for midpoint and Lindstrom, 0.2 µs for DLT, 1 to 4 µs for Gauss-Newton
+    /// and for DLT where the rays pass each other at some distance. Many pairs:
+    /// [`triangulate_all`](Self::triangulate_all).
     pub fn triangulate(&self, p1: Pixel<View1>, p2: Pixel<View2>) -> Result<Point3, GeomError> {
-        for (value, what) in [(p1.x, "x1"), (p1.y, "y1"), (p2.x, "x2"), (p2.y, "y2")] {
-            finite(value, || what.into())?;
-        }
-        let (q1, q2) = (p1.point(), p2.point());
+        let (q1, q2) = ([p1.x, p1.y], [p2.x, p2.y]);
         let g = &self.geometry;
-        g.check_parallax(&q1, &q2)?;
-        let x = match self.method {
+        check_pixels(p1, p2, g.sine(&q1, &q2))?;
+        let solution = match self.method {
             Triangulation::Dlt => dlt::solve(g, &q1, &q2)?,
-            Triangulation::Midpoint => midpoint::solve(g, &q1, &q2)?,
-            Triangulation::LindstromNiter2 => lindstrom::solve(g, &q1, &q2)?,
+            Triangulation::Midpoint => Midpoint::solve(g, &q1, &q2),
+            Triangulation::LindstromNiter2 => LindstromNiter2::solve(g, &q1, &q2),
             Triangulation::GaussNewton => gauss_newton::solve(g, &q1, &q2)?,
         };
-        // In baselines: the other ray then runs along the baseline.
-        if (x - g.view1.centre).norm() < Self::LEAST_SINE {
-            return Err(GeomError::AtEpipole { view: 2, x: p2.x, y: p2.y });
+        Finding::of(g, &q1, &q2, &solution).checked(p1, p2)
+    }
+
+    /// What [`triangulate`](Self::triangulate) gives for each pair, in their order, bit by bit.
+    ///
+    /// # Cost
+    /// O(number of pairs). As many pairs at once as the machine's vectors hold (AVX-512, AVX2, else
+    /// one by one): with 8, about 10 ns a pair for midpoint, 15 for Lindstrom and 30 for DLT.
+    pub fn triangulate_all(
+        &self,
+        pairs: impl IntoIterator<Item = (Pixel<View1>, Pixel<View2>)>,
+    ) -> Vec<Result<Point3, GeomError>> {
+        let pairs = pairs.into_iter();
+        match self.method {
+            Triangulation::Dlt => batch::run::<Dlt, _>(self, pairs),
+            Triangulation::Midpoint => batch::run::<Midpoint, _>(self, pairs),
+            Triangulation::LindstromNiter2 => batch::run::<LindstromNiter2, _>(self, pairs),
+            Triangulation::GaussNewton => pairs.map(|(p1, p2)| self.triangulate(p1, p2)).collect(),
         }
-        if (x - g.view2.centre).norm() < Self::LEAST_SINE {
-            return Err(GeomError::AtEpipole { view: 1, x: p1.x, y: p1.y });
-        }
-        let world = g.to_world(&x);
-        for row in 0..3 {
-            finite(world[row], || format!("coordinate {row} of the triangulated point"))?;
-        }
-        Ok(world)
     }
 }

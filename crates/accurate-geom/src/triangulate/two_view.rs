@@ -1,7 +1,7 @@
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix3x2, Vector3};
 
-use super::Triangulator;
-use crate::{Camera, GeomError, Point2, Point3, Rig};
+use super::number::{Number, constant, cross, dot, scaled};
+use crate::{Camera, Point3, Rig};
 
 /// One camera in the frame of [`TwoView`].
 #[derive(Debug, Clone)]
@@ -23,15 +23,41 @@ impl PinholeView {
         }
     }
 
-    /// Direction of the ray of a pixel; z in the camera frame is 1.
-    pub fn ray(&self, p: &Point2) -> Vector3<f64> {
-        self.direction_from_pixel * Vector3::new(p.x, p.y, 1.0)
+    /// Direction of the ray of a pixel; z in the camera frame is 1, so its length is at least 1.
+    #[inline(always)]
+    pub fn ray<N: Number>(&self, p: &[N; 2]) -> [N; 3] {
+        let m = &self.direction_from_pixel;
+        let row = |r: usize| [m[(r, 0)], m[(r, 1)], m[(r, 2)]];
+        let rows = [row(0), row(1), row(2)];
+        let mut ray = [p[0]; 3];
+        for k in 0..3 {
+            let [x, y, one] = constant(p[0], &rows[k]);
+            ray[k] = x * p[0] + y * p[1] + one;
+        }
+        ray
     }
 
-    /// Unit direction of the ray of a pixel, safe from overflow.
-    pub fn unit_ray(&self, p: &Point2) -> Vector3<f64> {
+    /// The ray with its largest entry at ±1: products of a few are safe from overflow.
+    #[inline(always)]
+    pub fn bounded_ray<N: Number>(&self, p: &[N; 2]) -> [N; 3] {
         let ray = self.ray(p);
-        (ray / ray.amax()).normalize()
+        let largest = ray[0].abs().larger(ray[1].abs()).larger(ray[2].abs());
+        scaled(p[0].all(1.0) / largest, &ray)
+    }
+
+    /// How `normal · ray` changes along x and y of the image.
+    #[inline(always)]
+    pub fn along_pixel_axes<N: Number>(&self, normal: &[N; 3]) -> [N; 2] {
+        let m = &self.direction_from_pixel;
+        let column = |c: usize| [m[(0, c)], m[(1, c)], m[(2, c)]];
+        let (x, y) = (column(0), column(1));
+        [dot(&constant(normal[0], &x), normal), dot(&constant(normal[0], &y), normal)]
+    }
+
+    /// The centre in all lanes of numbers like `like`.
+    #[inline(always)]
+    pub fn centre_as<N: Number>(&self, like: N) -> [N; 3] {
+        constant(like, &self.centre.into())
     }
 }
 
@@ -43,8 +69,12 @@ pub(super) struct TwoView {
     pub view2: PinholeView,
     /// Unit vector from centre 1 to centre 2.
     pub baseline: Vector3<f64>,
-    origin: Point3,
-    scale: f64,
+    /// The upper left 2 x 2 block of `F` with `p1ᵀ F p2 = 0`, row by row.
+    pub fundamental_2x2: [[f64; 2]; 2],
+    /// Midway between the centres, in the world.
+    pub origin: Point3,
+    /// The baseline in the rig's unit.
+    pub scale: f64,
 }
 
 impl TwoView {
@@ -53,26 +83,21 @@ impl TwoView {
         // A rig has refused a zero baseline.
         let scale = (c2 - c1).norm();
         let baseline = (c2 - c1) / scale;
-        Self {
-            view1: PinholeView::new(rig.camera1(), -0.5 * baseline),
-            view2: PinholeView::new(rig.camera2(), 0.5 * baseline),
-            baseline,
-            origin: nalgebra::center(&c1, &c2),
-            scale,
-        }
+        let view1 = PinholeView::new(rig.camera1(), -0.5 * baseline);
+        let view2 = PinholeView::new(rig.camera2(), 0.5 * baseline);
+        let m1: Matrix3x2<f64> = view1.direction_from_pixel.fixed_columns::<2>(0).into();
+        let m2: Matrix3x2<f64> = view2.direction_from_pixel.fixed_columns::<2>(0).into();
+        let f = m1.transpose() * baseline.cross_matrix() * m2;
+        let fundamental_2x2 = [[f[(0, 0)], f[(0, 1)]], [f[(1, 0)], f[(1, 1)]]];
+        let origin = nalgebra::center(&c1, &c2);
+        Self { view1, view2, baseline, fundamental_2x2, origin, scale }
     }
 
-    pub fn to_world(&self, x: &Vector3<f64>) -> Point3 {
-        self.origin + self.scale * x
-    }
-
-    pub fn check_parallax(&self, p1: &Point2, p2: &Point2) -> Result<(), GeomError> {
-        let sine = self.view1.unit_ray(p1).cross(&self.view2.unit_ray(p2)).norm();
-        // NaN (overflow in a ray) fails the comparison and is refused with it.
-        if sine >= Triangulator::LEAST_SINE {
-            Ok(())
-        } else {
-            Err(GeomError::ParallelRays { sine, least: Triangulator::LEAST_SINE })
-        }
+    /// Sine of the angle between the rays of two pixels; NaN where a ray overflows.
+    #[inline(always)]
+    pub fn sine<N: Number>(&self, p1: &[N; 2], p2: &[N; 2]) -> N {
+        let (d1, d2) = (self.view1.bounded_ray(p1), self.view2.bounded_ray(p2));
+        let normal = cross(&d1, &d2);
+        (dot(&normal, &normal) / (dot(&d1, &d1) * dot(&d2, &d2))).sqrt()
     }
 }

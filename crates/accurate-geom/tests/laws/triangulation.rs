@@ -135,6 +135,37 @@ proptest! {
     }
 
     #[test]
+    fn all_at_once_gives_the_bits_of_one_by_one(
+        (scene, points) in scenes_with_points::<9>(),
+        noise in prop::collection::vec(noise(30.0), 0..150),
+        spoilt in prop::collection::vec((0..150usize, 0..4usize, prop::sample::select(vec![
+            f64::NAN, f64::INFINITY, 1e300, -1e160, 1e12,
+        ])), 0..4),
+    ) {
+        let rig = &scene.rig;
+        let mut pairs: Vec<_> = noise.iter().enumerate()
+            .map(|(k, &noise)| noisy(rig, &points[k % 9], noise))
+            .collect();
+        for (at, which, value) in spoilt {
+            if let Some((p1, p2)) = pairs.get_mut(at) {
+                *[&mut p1.x, &mut p1.y, &mut p2.x, &mut p2.y][which] = value;
+            }
+        }
+        // And what no method accepts.
+        pairs.insert(pairs.len() / 2, epipoles(rig));
+        for method in Triangulation::ALL {
+            let triangulator = Triangulator::new(rig, method);
+            let together = triangulator.triangulate_all(pairs.iter().copied());
+            prop_assert_eq!(together.len(), pairs.len());
+            for (found, &(p1, p2)) in together.iter().zip(&pairs) {
+                // Their text tells NaN from NaN and every f64 from its neighbours.
+                let alone = triangulator.triangulate(p1, p2);
+                prop_assert_eq!(format!("{found:?}"), format!("{alone:?}"), "{}", method);
+            }
+        }
+    }
+
+    #[test]
     fn pixels_at_the_epipoles_are_refused((scene, [x]) in scenes_with_points::<1>()) {
         let rig = &scene.rig;
         let (c1, c2) = (rig.camera1().centre(), rig.camera2().centre());
