@@ -5,7 +5,6 @@ use pulp::{Arch, Simd, WithSimd};
 use super::Triangulator;
 use super::method::Method;
 use super::number::Vector;
-use super::solution::Finding;
 use super::two_view::TwoView;
 use crate::{GeomError, Pixel, Point3, View1, View2};
 
@@ -16,8 +15,8 @@ const CHUNK: usize = 64;
 /// x1, y1, x2, y2 of a chunk.
 type Pixels = [[f64; CHUNK]; 4];
 
-/// The numbers of a [`Finding`] of a chunk.
-type Findings = [[f64; CHUNK]; 9];
+/// x, y, z of the points of a chunk, and a number above 0 where they are points beyond doubt.
+type Points = [[f64; CHUNK]; 4];
 
 /// Triangulates all pairs, [`CHUNK`] at a time.
 pub(super) fn run<M: Method, I: Iterator<Item = (Pixel<View1>, Pixel<View2>)>>(
@@ -28,7 +27,7 @@ pub(super) fn run<M: Method, I: Iterator<Item = (Pixel<View1>, Pixel<View2>)>>(
     let geometry = &triangulator.geometry;
     let mut results = Vec::with_capacity(pairs.size_hint().0);
     let mut pixels = [[0.0; CHUNK]; 4];
-    let mut findings = [[0.0; CHUNK]; 9];
+    let mut points = [[0.0; CHUNK]; 4];
     loop {
         let mut count = 0;
         for (p1, p2) in pairs.by_ref().take(CHUNK) {
@@ -41,17 +40,16 @@ pub(super) fn run<M: Method, I: Iterator<Item = (Pixel<View1>, Pixel<View2>)>>(
             geometry,
             pixels: &pixels,
             count,
-            findings: &mut findings,
+            points: &mut points,
             method: PhantomData,
         });
+        let [x, y, z, fine] = &points;
         for k in 0..count {
-            let (p1, p2) =
-                (Pixel::new(pixels[0][k], pixels[1][k]), Pixel::new(pixels[2][k], pixels[3][k]));
-            let finding = finding(&findings, k);
-            // What has not settled takes the long way.
-            results.push(if finding.open <= 0.0 {
-                finding.checked(p1, p2)
+            results.push(if fine[k] > 0.0 {
+                Ok(Point3::new(x[k], y[k], z[k]))
             } else {
+                let p1 = Pixel::new(pixels[0][k], pixels[1][k]);
+                let p2 = Pixel::new(pixels[2][k], pixels[3][k]);
                 triangulator.triangulate(p1, p2)
             });
         }
@@ -65,7 +63,7 @@ struct Chunk<'a, M> {
     geometry: &'a TwoView,
     pixels: &'a Pixels,
     count: usize,
-    findings: &'a mut Findings,
+    points: &'a mut Points,
     method: PhantomData<M>,
 }
 
@@ -81,26 +79,11 @@ impl<M: Method> WithSimd for Chunk<'_, M> {
         for k in 0..self.count.div_ceil(S::F64_LANES) {
             let p1 = [Vector { simd, lanes: x1[k] }, Vector { simd, lanes: y1[k] }];
             let p2 = [Vector { simd, lanes: x2[k] }, Vector { simd, lanes: y2[k] }];
-            let solution = M::solve(g, &p1, &p2);
-            let f = Finding::of(g, &p1, &p2, &solution);
-            let [x, y, z] = f.world;
-            let [from1, from2] = f.from_centres_2;
-            let numbers = [x, y, z, f.sine, f.solved_sine, f.weight, f.open, from1, from2];
+            let ([x, y, z], fine) = M::solve(g, &p1, &p2).world(g, &p1, &p2);
+            let numbers = [x, y, z, fine];
             for n in 0..numbers.len() {
-                S::as_mut_simd_f64s(&mut self.findings[n]).0[k] = numbers[n].lanes;
+                S::as_mut_simd_f64s(&mut self.points[n]).0[k] = numbers[n].lanes;
             }
         }
-    }
-}
-
-fn finding(findings: &Findings, k: usize) -> Finding<f64> {
-    let [x, y, z, sine, solved_sine, weight, open, from1, from2] = findings;
-    Finding {
-        world: [x[k], y[k], z[k]],
-        sine: sine[k],
-        solved_sine: solved_sine[k],
-        weight: weight[k],
-        open: open[k],
-        from_centres_2: [from1[k], from2[k]],
     }
 }

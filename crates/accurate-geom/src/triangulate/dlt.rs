@@ -1,9 +1,10 @@
 use nalgebra::{Matrix4, SVD};
 
+use super::Triangulator;
 use super::method::Method;
 use super::number::{Number, add_scaled, constant, dot, scaled};
 use super::solution::Solution;
-use super::two_view::TwoView;
+use super::two_view::{Parallax, TwoView};
 use crate::GeomError;
 
 const MAX_SVD_ITERATIONS: usize = 200;
@@ -18,8 +19,8 @@ const ARRIVED: f64 = 64.0 * f64::EPSILON;
 /// Linear triangulation: the unit 4-vector that least violates `x P₃ - P₁ = 0` and
 /// `y P₃ - P₂ = 0` of both views.
 ///
-/// The rows keep their usual weights (depth times pixel error); only one common factor is taken
-/// out. The unit of the 4-vector is the baseline, so that its four entries are comparable.
+/// The rows keep their usual weights (depth times pixel error). The unit of the 4-vector is the
+/// baseline, so that its four entries are comparable.
 ///
 /// The vector is found by inverse iteration with the factor R of A = QR, not with `AᵀA`, which
 /// would halve the digits. Each step shrinks the error by (σ₄/σ₃)², which is tiny where the rays
@@ -33,44 +34,36 @@ pub(super) struct Dlt;
 impl Method for Dlt {
     #[inline(always)]
     fn solve<N: Number>(g: &TwoView, p1: &[N; 2], p2: &[N; 2]) -> Solution<N> {
-        let (r, reciprocal) = triangular(equations(g, p1, p2));
+        let factor = Factor::of(equations(g, p1, p2));
         let like = p1[0];
         // Any start that is not orthogonal to the answer, which no rig singles out.
         let start = constant(like, &[0.4, 0.5, 0.6, 1.0]);
-        let mut x = unit(&back_substituted(&r, &reciprocal, &start));
+        let mut x = position(&factor.back(&start));
         let mut change = like.all(1.0);
-        // Positive until a lane has settled; from then on it keeps its vector, so that it does not
+        // Positive until a lane has settled; from then on it keeps its place, so that it does not
         // depend on its neighbours.
         let mut open = like.all(1.0);
         let mut steps = 0;
         while steps < MAX_STEPS && !open.all_at_most(0.0) {
-            let forward = forward_substituted(&r, &reciprocal, &x);
-            let next = unit(&back_substituted(&r, &reciprocal, &forward));
-            let mut moved = (next[0] - x[0]).abs();
-            for k in 1..4 {
-                moved = moved.larger((next[k] - x[k]).abs());
-            }
+            let next = position(&factor.back(&factor.forward(&x)));
+            let moved = distance(&next, &x);
+            // In the unit 4-vector a place is 1 + |x| times finer.
+            let size = like.all(1.0) + next[0].abs().larger(next[1].abs()).larger(next[2].abs());
             // Steps shrink by a constant factor: the error left is about moved · moved / change.
-            let next_open = (moved - like.all(ARRIVED))
-                .smaller(moved * moved - like.all(f64::EPSILON) * change);
-            for k in 0..4 {
+            let next_open = (moved - like.all(ARRIVED) * size)
+                .smaller(moved * moved - like.all(f64::EPSILON) * change * size);
+            for k in 0..3 {
                 x[k] = open.if_positive(next[k], x[k]);
             }
             change = open.if_positive(moved, change);
             open = open.if_positive(next_open, open);
             steps += 1;
         }
-        let weight = x[3];
-        Solution {
-            position: scaled(like.all(1.0) / weight, &[x[0], x[1], x[2]]),
-            sine: like.all(1.0),
-            weight,
-            open,
-        }
+        Solution { position: x, parallax: Parallax::right_angle(like), open }
     }
 }
 
-/// The columns of A, its largest entry 1.
+/// The columns of A.
 #[inline(always)]
 fn equations<N: Number>(g: &TwoView, p1: &[N; 2], p2: &[N; 2]) -> [[N; 4]; 4] {
     let like = p1[0];
@@ -83,74 +76,83 @@ fn equations<N: Number>(g: &TwoView, p1: &[N; 2], p2: &[N; 2]) -> [[N; 4]; 4] {
             for c in 0..3 {
                 let value = p[row] * like.all(m[(2, c)]) - like.all(m[(row, c)]);
                 a[c][offset + row] = value;
-                at_centre = at_centre + value * centre[c];
+                at_centre = at_centre - value * centre[c];
             }
-            a[3][offset + row] = like.all(0.0) - at_centre;
+            a[3][offset + row] = at_centre;
         }
-    }
-    let mut largest = like.all(0.0);
-    for column in &a {
-        for &value in column {
-            largest = value.abs().larger(largest);
-        }
-    }
-    let factor = like.all(1.0) / largest;
-    let mut k = 0;
-    while k < 4 {
-        a[k] = scaled(factor, &a[k]);
-        k += 1;
     }
     a
 }
 
-/// R of A = QR by modified Gram-Schmidt, and the reciprocals of its diagonal. The diagonal is kept
-/// above one rounding of A: an exact null vector is then found like any other.
-#[inline(always)]
-fn triangular<N: Number>(mut a: [[N; 4]; 4]) -> ([[N; 4]; 4], [N; 4]) {
-    let like = a[0][0];
-    let mut r = [[like.all(0.0); 4]; 4];
-    let mut reciprocal = [like; 4];
-    for k in 0..4 {
-        let length = dot(&a[k], &a[k]).sqrt().larger(like.all(f64::EPSILON));
-        reciprocal[k] = like.all(1.0) / length;
-        let q = scaled(reciprocal[k], &a[k]);
-        for j in k + 1..4 {
-            r[k][j] = dot(&q, &a[j]);
-            a[j] = add_scaled(&a[j], like.all(0.0) - r[k][j], &q);
+/// `AᵀA = Uᵀ D U` with U upper triangular, its diagonal 1, taken from A itself: R without roots.
+struct Factor<N> {
+    u: [[N; 4]; 4],
+    /// 1 / D.
+    weights: [N; 4],
+}
+
+impl<N: Number> Factor<N> {
+    /// Modified Gram-Schmidt. D is kept above a rounding of A, squared: an exact null vector is then
+    /// found like any other.
+    #[inline(always)]
+    fn of(mut a: [[N; 4]; 4]) -> Self {
+        let like = a[0][0];
+        let mut u = [[like.all(0.0); 4]; 4];
+        let mut weights = [like; 4];
+        let mut least = like.all(0.0);
+        for k in 0..4 {
+            let length_2 = dot(&a[k], &a[k]);
+            if k == 0 {
+                least = length_2 * like.all(f64::EPSILON * f64::EPSILON);
+            }
+            weights[k] = like.all(1.0) / length_2.larger(least);
+            for j in k + 1..4 {
+                u[k][j] = dot(&a[k], &a[j]) * weights[k];
+                a[j] = add_scaled(&a[j], like.all(0.0) - u[k][j], &a[k]);
+            }
         }
+        Self { u, weights }
     }
-    (r, reciprocal)
+
+    /// z of U z = y.
+    #[inline(always)]
+    fn back(&self, y: &[N; 4]) -> [N; 4] {
+        let u = &self.u;
+        let z2 = y[2] - u[2][3] * y[3];
+        let z1 = y[1] - u[1][2] * z2 - u[1][3] * y[3];
+        let z0 = y[0] - u[0][1] * z1 - u[0][2] * z2 - u[0][3] * y[3];
+        [z0, z1, z2, y[3]]
+    }
+
+    /// y of Uᵀ D y = (x, 1).
+    #[inline(always)]
+    fn forward(&self, x: &[N; 3]) -> [N; 4] {
+        let u = &self.u;
+        let y0 = x[0];
+        let y1 = x[1] - u[0][1] * y0;
+        let y2 = x[2] - u[0][2] * y0 - u[1][2] * y1;
+        let y3 = x[0].all(1.0) - u[0][3] * y0 - u[1][3] * y1 - u[2][3] * y2;
+        let w = &self.weights;
+        [y0 * w[0], y1 * w[1], y2 * w[2], y3 * w[3]]
+    }
 }
 
-/// z of R z = y.
+/// The place of a homogeneous 4-vector.
 #[inline(always)]
-fn back_substituted<N: Number>(r: &[[N; 4]; 4], reciprocal: &[N; 4], y: &[N; 4]) -> [N; 4] {
-    let z3 = y[3] * reciprocal[3];
-    let z2 = (y[2] - r[2][3] * z3) * reciprocal[2];
-    let z1 = (y[1] - r[1][2] * z2 - r[1][3] * z3) * reciprocal[1];
-    let z0 = (y[0] - r[0][1] * z1 - r[0][2] * z2 - r[0][3] * z3) * reciprocal[0];
-    [z0, z1, z2, z3]
+fn position<N: Number>(v: &[N; 4]) -> [N; 3] {
+    scaled(v[0].all(1.0) / v[3], &[v[0], v[1], v[2]])
 }
 
-/// y of Rᵀ y = x.
+/// The largest difference of two entries.
 #[inline(always)]
-fn forward_substituted<N: Number>(r: &[[N; 4]; 4], reciprocal: &[N; 4], x: &[N; 4]) -> [N; 4] {
-    let y0 = x[0] * reciprocal[0];
-    let y1 = (x[1] - r[0][1] * y0) * reciprocal[1];
-    let y2 = (x[2] - r[0][2] * y0 - r[1][2] * y1) * reciprocal[2];
-    let y3 = (x[3] - r[0][3] * y0 - r[1][3] * y1 - r[2][3] * y2) * reciprocal[3];
-    [y0, y1, y2, y3]
-}
-
-#[inline(always)]
-fn unit<N: Number>(v: &[N; 4]) -> [N; 4] {
-    scaled(v[0].all(1.0) / dot(v, v).sqrt(), v)
+fn distance<N: Number>(a: &[N; 3], b: &[N; 3]) -> N {
+    (a[0] - b[0]).abs().larger((a[1] - b[1]).abs()).larger((a[2] - b[2]).abs())
 }
 
 /// [`Dlt`], by singular value decomposition where the iteration has not settled.
 ///
 /// # Errors
-/// [`GeomError::NoConvergence`].
+/// [`GeomError::NoConvergence`], [`GeomError::PointAtInfinity`].
 pub(super) fn solve(g: &TwoView, p1: &[f64; 2], p2: &[f64; 2]) -> Result<Solution<f64>, GeomError> {
     let found = Dlt::solve(g, p1, p2);
     if found.settled() { Ok(found) } else { by_decomposition(g, p1, p2) }
@@ -159,6 +161,7 @@ pub(super) fn solve(g: &TwoView, p1: &[f64; 2], p2: &[f64; 2]) -> Result<Solutio
 fn by_decomposition(g: &TwoView, p1: &[f64; 2], p2: &[f64; 2]) -> Result<Solution<f64>, GeomError> {
     let columns = equations(g, p1, p2);
     let a = Matrix4::from_fn(|row, column| columns[column][row]);
+    let a = a / a.amax();
     let failed = |iterations| GeomError::NoConvergence {
         what: "the singular value decomposition of DLT",
         iterations,
@@ -167,8 +170,11 @@ fn by_decomposition(g: &TwoView, p1: &[f64; 2], p2: &[f64; 2]) -> Result<Solutio
         .ok_or_else(|| failed(MAX_SVD_ITERATIONS))?;
     let v_t = svd.v_t.ok_or_else(|| failed(0))?;
     let x = v_t.row(svd.singular_values.imin()).transpose();
+    if !(x.w.abs() >= Triangulator::LEAST_SINE) {
+        return Err(GeomError::PointAtInfinity { weight: x.w });
+    }
     let position = (x.xyz() / x.w).into();
-    Ok(Solution { position, sine: 1.0, weight: x.w, open: 0.0 })
+    Ok(Solution { position, parallax: Parallax::right_angle(1.0), open: 0.0 })
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 use super::method::Method;
 use super::number::{Number, add_scaled, constant, cross, dot, scaled};
 use super::solution::Solution;
-use super::two_view::TwoView;
+use super::two_view::{Parallax, TwoView};
 
 /// Midpoint of the shortest segment between the two rays.
 ///
@@ -13,21 +13,20 @@ pub(super) struct Midpoint;
 impl Method for Midpoint {
     #[inline(always)]
     fn solve<N: Number>(g: &TwoView, p1: &[N; 2], p2: &[N; 2]) -> Solution<N> {
-        let (d1, d2) = (g.view1.bounded_ray(p1), g.view2.bounded_ray(p2));
+        let (d1, d2) = g.bounded_rays(p1, p2);
         let normal = cross(&d1, &d2);
-        let normal_2 = dot(&normal, &normal);
         // Feet of the common perpendicular. Triple products keep their relative accuracy for small
         // angles, where 1 - (d1·d2)² would cancel.
         let baseline = constant(p1[0], &g.baseline.into());
-        let depth1 = dot(&cross(&baseline, &d2), &normal) / normal_2;
-        let depth2 = dot(&cross(&baseline, &d1), &normal) / normal_2;
+        let share = p1[0].all(1.0) / dot(&normal, &normal);
+        let depth1 = dot(&cross(&baseline, &d2), &normal) * share;
+        let depth2 = dot(&cross(&baseline, &d1), &normal) * share;
         let foot1 = add_scaled(&g.view1.centre_as(p1[0]), depth1, &d1);
         let foot2 = add_scaled(&g.view2.centre_as(p1[0]), depth2, &d2);
         let half = p1[0].all(0.5);
         Solution {
             position: scaled(half, &add_scaled(&foot1, half.all(1.0), &foot2)),
-            sine: (normal_2 / (dot(&d1, &d1) * dot(&d2, &d2))).sqrt(),
-            weight: half.all(1.0),
+            parallax: Parallax::between(&d1, &d2, &normal),
             open: half.all(0.0),
         }
     }

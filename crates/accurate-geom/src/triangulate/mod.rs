@@ -16,7 +16,7 @@ use dlt::Dlt;
 use lindstrom::LindstromNiter2;
 use method::Method;
 use midpoint::Midpoint;
-use solution::{Finding, check_pixels};
+use solution::check_pixels;
 use two_view::TwoView;
 
 /// How a pair of pixels becomes a 3D point. All four agree on exact data.
@@ -118,14 +118,14 @@ impl Triangulator {
     pub fn triangulate(&self, p1: Pixel<View1>, p2: Pixel<View2>) -> Result<Point3, GeomError> {
         let (q1, q2) = ([p1.x, p1.y], [p2.x, p2.y]);
         let g = &self.geometry;
-        check_pixels(p1, p2, g.sine(&q1, &q2))?;
+        check_pixels(g, p1, p2)?;
         let solution = match self.method {
             Triangulation::Dlt => dlt::solve(g, &q1, &q2)?,
             Triangulation::Midpoint => Midpoint::solve(g, &q1, &q2),
             Triangulation::LindstromNiter2 => LindstromNiter2::solve(g, &q1, &q2),
             Triangulation::GaussNewton => gauss_newton::solve(g, &q1, &q2)?,
         };
-        Finding::of(g, &q1, &q2, &solution).checked(p1, p2)
+        solution.checked(g, p1, p2)
     }
 
     /// What [`triangulate`](Self::triangulate) gives for each pair, in their order, bit by bit.

@@ -37,14 +37,6 @@ impl PinholeView {
         ray
     }
 
-    /// The ray with its largest entry at ±1: products of a few are safe from overflow.
-    #[inline(always)]
-    pub fn bounded_ray<N: Number>(&self, p: &[N; 2]) -> [N; 3] {
-        let ray = self.ray(p);
-        let largest = ray[0].abs().larger(ray[1].abs()).larger(ray[2].abs());
-        scaled(p[0].all(1.0) / largest, &ray)
-    }
-
     /// How `normal · ray` changes along x and y of the image.
     #[inline(always)]
     pub fn along_pixel_axes<N: Number>(&self, normal: &[N; 3]) -> [N; 2] {
@@ -93,11 +85,58 @@ impl TwoView {
         Self { view1, view2, baseline, fundamental_2x2, origin, scale }
     }
 
-    /// Sine of the angle between the rays of two pixels; NaN where a ray overflows.
+    /// The rays of two pixels, each with its largest entry near ±1: products of a few are safe from
+    /// overflow.
     #[inline(always)]
-    pub fn sine<N: Number>(&self, p1: &[N; 2], p2: &[N; 2]) -> N {
-        let (d1, d2) = (self.view1.bounded_ray(p1), self.view2.bounded_ray(p2));
-        let normal = cross(&d1, &d2);
-        (dot(&normal, &normal) / (dot(&d1, &d1) * dot(&d2, &d2))).sqrt()
+    pub fn bounded_rays<N: Number>(&self, p1: &[N; 2], p2: &[N; 2]) -> ([N; 3], [N; 3]) {
+        let (ray1, ray2) = (self.view1.ray(p1), self.view2.ray(p2));
+        let largest1 = ray1[0].abs().larger(ray1[1].abs()).larger(ray1[2].abs());
+        let largest2 = ray2[0].abs().larger(ray2[1].abs()).larger(ray2[2].abs());
+        // Division is what takes longest here: one for both.
+        let both = p1[0].all(1.0) / (largest1 * largest2);
+        (scaled(both * largest2, &ray1), scaled(both * largest1, &ray2))
+    }
+
+    /// The angle between the rays of two pixels; NaN where a ray overflows.
+    #[inline(always)]
+    pub fn parallax<N: Number>(&self, p1: &[N; 2], p2: &[N; 2]) -> Parallax<N> {
+        let (d1, d2) = self.bounded_rays(p1, p2);
+        Parallax::between(&d1, &d2, &cross(&d1, &d2))
+    }
+}
+
+/// The angle between two rays, whose sine costs more than to tell whether it is large enough.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Parallax<N> {
+    /// Squared length of the cross product.
+    normal_2: N,
+    /// Product of the squared lengths.
+    lengths_2: N,
+}
+
+impl<N: Number> Parallax<N> {
+    /// `normal` is `d1 x d2`.
+    #[inline(always)]
+    pub fn between(d1: &[N; 3], d2: &[N; 3], normal: &[N; 3]) -> Self {
+        Self { normal_2: dot(normal, normal), lengths_2: dot(d1, d1) * dot(d2, d2) }
+    }
+
+    /// Of a method that intersects no rays: a right angle.
+    #[inline(always)]
+    pub fn right_angle(like: N) -> Self {
+        Self { normal_2: like.all(1.0), lengths_2: like.all(1.0) }
+    }
+
+    /// Above 0 where the sine is clearly above `least`; NaN if it is.
+    #[inline(always)]
+    pub fn beyond(&self, least: f64) -> N {
+        // Twice the sine, four times its square: roundings do not matter.
+        self.normal_2 - self.normal_2.all(4.0 * least * least) * self.lengths_2
+    }
+}
+
+impl Parallax<f64> {
+    pub fn sine(&self) -> f64 {
+        (self.normal_2 / self.lengths_2).sqrt()
     }
 }
