@@ -32,6 +32,7 @@ mod frechet;
 mod interval;
 mod mask_scores;
 mod nearest;
+mod polyline_distances;
 mod published;
 mod quantile;
 mod reprojection;
@@ -48,6 +49,7 @@ pub use interval::{DEFAULT_RESAMPLES, MeanInterval, bootstrap_mean};
 pub use mask_scores::{
     SkeletonAgreement, betti_0, betti_0_error, cl_dice, dice, skeleton_agreement, soft_dice,
 };
+pub use polyline_distances::polyline_distances;
 pub use published::{
     Dataset, Metric, PUBLISHED_ROWS, PublishedCell, PublishedInput, PublishedRow, published,
     published_cells, published_table,
