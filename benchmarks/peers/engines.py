@@ -1,10 +1,14 @@
 """The engines of `accurate segment` against ONNX Runtime itself, on the same image and threads.
 
-    benchmarks/peers/engines.py MODEL.accmodel [--threads 2] [--side 512] [--runs 5]
+    benchmarks/peers/engines.py MODEL.accmodel [--threads 2] [--side 512] [--runs 3] [--rounds 5]
+        [--json FILE]
 
 Prints user CPU seconds of one run of the network: Python's `onnxruntime`, then `accurate` with `ort`
-and with `rten`. For `accurate` it is the difference between segmenting many images and one, so that
-start-up and loading the model do not count, but reading, normalising, post-processing and writing do.
+and with `rten`, in turn, round after round; the medians over the rounds, and the median of each
+round's ratio, which is what a loaded machine leaves sound. For `accurate` it is the difference between
+segmenting many images and one, so that start-up and loading the model do not count, but reading,
+normalising, post-processing and writing do. The peak of memory is that of segmenting one image, start
+and model included.
 Needs `onnxruntime` and `numpy`, and `accurate` on PATH or in ACCURATE.
 """
 
@@ -12,10 +16,12 @@ import argparse
 import json
 import os
 import resource
+import statistics
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 import zlib
 from pathlib import Path
 
@@ -26,7 +32,9 @@ parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("model", type=Path)
 parser.add_argument("--threads", type=int, default=2)
 parser.add_argument("--side", type=int, default=512)
-parser.add_argument("--runs", type=int, default=5)
+parser.add_argument("--runs", type=int, default=3)
+parser.add_argument("--rounds", type=int, default=5)
+parser.add_argument("--json", type=Path)
 args = parser.parse_args()
 program = os.environ.get("ACCURATE", "accurate")
 
@@ -66,30 +74,77 @@ options.add_session_config_entry("session.intra_op.allow_spinning", "0")
 session = onnxruntime.InferenceSession(network, options, providers=["CPUExecutionProvider"])
 grey = image.astype(np.float64)
 tensor = ((grey - grey.mean()) / grey.std()).astype(np.float32)[None, None]
-session.run(None, {manifest["network"]["input"]: tensor})
-before = user(resource.RUSAGE_SELF)
-for _ in range(args.runs):
-    session.run(None, {manifest["network"]["input"]: tensor})
-peer = (user(resource.RUSAGE_SELF) - before) / args.runs
-print(f"onnxruntime {onnxruntime.__version__} (Python): {peer:.3f} s")
+feed = {manifest["network"]["input"]: tensor}
+session.run(None, feed)
+
+
+def peer_seconds():
+    before = user(resource.RUSAGE_SELF)
+    for _ in range(args.runs):
+        session.run(None, feed)
+    return (user(resource.RUSAGE_SELF) - before) / args.runs
+
 
 library = next(Path(onnxruntime.__file__).parent.glob("capi/libonnxruntime.so.*"))
+
+
+def run(engine, paths, folder):
+    """User seconds and peak memory, MiB, of one process of ours."""
+    command = [program, "-q", "--threads", str(args.threads), "segment", *map(str, paths)]
+    command += ["--model", str(args.model), "--engine", engine, "-o", str(folder / "out")]
+    command += ["--onnxruntime", str(library)]
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    # The peak that wait4 gives begins with that of this process, which a child of it inherits.
+    peak, done = 0.0, 0
+    while not done:
+        try:
+            peak = max(peak, high_water_mib(child.pid))
+        except OSError:
+            pass
+        time.sleep(0.02)
+        done, status, usage = os.wait4(child.pid, os.WNOHANG)
+    if status:
+        sys.exit(f"{' '.join(command)}: status {status}")
+    return usage.ru_utime, peak
+
+
+def high_water_mib(pid):
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    values = [int(line.split()[1]) for line in lines if line.startswith("VmHWM:")]
+    return values[0] / 1024 if values else 0.0
+
+
+def our_seconds(engine, images, folder):
+    one, peak = run(engine, images[:1], folder)
+    return (run(engine, images, folder)[0] - one) / args.runs, peak
+
+
+rounds = []
 with tempfile.TemporaryDirectory() as folder:
     folder = Path(folder)
     images = [folder / f"image_{k}.png" for k in range(args.runs + 1)]
     for path in images:
         png(path)
-    for engine in ("ort", "rten"):
+    for _ in range(args.rounds):
+        found = {"onnxruntime": peer_seconds()}
+        for engine in ("ort", "rten"):
+            found[engine], found[f"{engine}_peak_mib"] = our_seconds(engine, images, folder)
+        rounds.append(found)
 
-        def seconds(paths):
-            before = user(resource.RUSAGE_CHILDREN)
-            command = [program, "-q", "--threads", str(args.threads), "segment", *map(str, paths)]
-            command += ["--model", str(args.model), "--engine", engine, "-o", str(folder / "out")]
-            command += ["--onnxruntime", str(library)]
-            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-            return user(resource.RUSAGE_CHILDREN) - before
-
-        ours = (seconds(images) - seconds(images[:1])) / args.runs
-        peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-        print(f"accurate, {engine}: {ours:.3f} s, {ours / peer:.2f} x; peak so far {peak:.0f} MiB")
-sys.exit(0)
+result = {
+    "model": manifest["name"],
+    "onnxruntime_version": onnxruntime.__version__,
+    "side_px": args.side,
+    "threads": args.threads,
+    "rounds": rounds,
+    "onnxruntime_s": statistics.median(r["onnxruntime"] for r in rounds),
+}
+print(f"onnxruntime {onnxruntime.__version__} (Python): {result['onnxruntime_s']:.3f} s")
+for engine in ("ort", "rten"):
+    seconds = statistics.median(r[engine] for r in rounds)
+    ratio = statistics.median(r[engine] / r["onnxruntime"] for r in rounds)
+    peak = max(r[f"{engine}_peak_mib"] for r in rounds)
+    result |= {f"{engine}_s": seconds, f"{engine}_ratio": ratio, f"{engine}_peak_mib": peak}
+    print(f"accurate, {engine}: {seconds:.3f} s, {ratio:.2f} x; peak {peak:.0f} MiB")
+if args.json:
+    args.json.write_text(json.dumps(result, indent=1) + "\n")

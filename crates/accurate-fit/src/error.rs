@@ -31,6 +31,16 @@ pub enum FitError {
         /// Index in it, from 0.
         index: usize,
     },
+    /// Two images of one view have different sizes.
+    #[error("view {view}: the mask is {} x {} pixels (rows, columns), its map {} x {}", expected.0, expected.1, found.0, found.1)]
+    ShapeMismatch {
+        /// 1 or 2.
+        view: u8,
+        /// Rows and columns of the mask.
+        expected: (usize, usize),
+        /// Rows and columns of the map.
+        found: (usize, usize),
+    },
     /// The curve has no length, or one that no image can hold.
     #[error("a curve of length {length_px} px cannot be fitted")]
     BadLength {

@@ -11,12 +11,15 @@ use crate::outline_problem::{Evaluation, OutlineProblem};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judgement {
     /// Outline that the curve does not explain: each boundary point's misfit beyond 0.8 px, at most
-    /// 4, summed and divided by 10 px. Zero at the truth.
+    /// 4, times how sure a probability map is of the body there, summed and divided by 10 px. Zero at
+    /// the truth.
     pub unexplained: f64,
-    /// Curve that the masks do not show: the distance outside beyond 1 px, at most 4, summed over
-    /// the curve in steps of 1 px and divided by 10 px. Zero at the truth.
+    /// Curve that the masks do not show: the distance outside beyond 1 px, at most 4, times how sure
+    /// a probability map is that there is no body, summed over the curve in steps of 1 px and divided
+    /// by 10 px. Zero at the truth.
     pub outside: f64,
-    /// Sum of squared residuals, each at most 4 px², of the boundary points used.
+    /// Sum of squared residuals, each at most 4 px², of the boundary points used; those of a
+    /// probability map in units of 1/18 px² per variance of the point.
     pub chi: f64,
     /// Boundary points used, by view.
     pub used: [usize; 2],
@@ -50,11 +53,17 @@ pub struct UnexplainedStretch {
     pub points: Vec<[f64; 2]>,
     /// Their share of [`Judgement::unexplained`].
     pub unexplained: f64,
+    /// Whether no explained outline is near: a piece by itself.
+    pub isolated: bool,
+    /// Whether the outline was read off a probability map.
+    pub from_map: bool,
 }
 
-/// Misfit of a boundary point beyond what digitisation explains, px.
-fn excess(residual: f64) -> f64 {
-    (residual.abs() - 0.8).clamp(0.0, 4.0)
+/// Misfit of outline point `i` beyond what digitisation explains, px, as far as the body is sure
+/// there.
+fn excess(problem: &OutlineProblem<'_>, e: &Evaluation, view: usize, i: usize) -> f64 {
+    let trust = problem.outlines[view].map.as_ref().map_or(1.0, |map| map.trust[i]);
+    trust * (residual(e, view, i).abs() - 0.8).clamp(0.0, 4.0)
 }
 
 /// Residual of outline point `i` against the nearest point of the curve, whatever the gates say.
@@ -70,13 +79,14 @@ pub(crate) fn judge(problem: &OutlineProblem<'_>, e: &Evaluation) -> Judgement {
     for view in 0..2 {
         points[view] = e.nearest[view].len();
         for i in 0..points[view] {
-            unexplained += excess(residual(e, view, i)) / 10.0;
+            unexplained += excess(problem, e, view, i) / 10.0;
         }
         let chords = &e.chords[view];
         let step_px = chords.length_px() / (chords.points.len() - 1) as f64;
         for p in &chords.points {
             if let Some((distance, _)) = problem.outside(view, p) {
-                outside += (distance - 1.0).clamp(0.0, 4.0) / 10.0 * step_px;
+                let doubt = problem.doubt(view, p);
+                outside += doubt * (distance - 1.0).clamp(0.0, 4.0) / 10.0 * step_px;
             }
         }
     }
@@ -84,7 +94,9 @@ pub(crate) fn judge(problem: &OutlineProblem<'_>, e: &Evaluation) -> Judgement {
     let mut used = [0; 2];
     for row in e.rows.iter().filter(|row| row.passes && !row.outside) {
         let r = row.distance - e.state.half_px[row.view];
-        chi += (r * r).min(4.0);
+        // Points of a map differ in what they are worth; those of a mask differ by direction only.
+        let worth = if problem.outlines[row.view].map.is_some() { row.precision } else { 1.0 };
+        chi += (worth * r * r).min(4.0);
         used[row.view] += 1;
     }
     let bending = e.state.spline.bending() / problem.px_per_unit;
@@ -102,7 +114,8 @@ pub(crate) fn unexplained_stretches(
     for view in 0..2 {
         let outline = problem.outlines[view];
         let mut open: Vec<bool> =
-            (0..outline.points.len()).map(|i| excess(residual(e, view, i)) > 0.0).collect();
+            (0..outline.points.len()).map(|i| excess(problem, e, view, i) > 0.0).collect();
+        let unexplained = open.clone();
         let mut queue = Vec::new();
         for seed in 0..open.len() {
             if !open[seed] {
@@ -110,17 +123,26 @@ pub(crate) fn unexplained_stretches(
             }
             open[seed] = false;
             queue.push(seed);
-            let mut stretch =
-                UnexplainedStretch { view: view as u8 + 1, points: Vec::new(), unexplained: 0.0 };
+            let mut stretch = UnexplainedStretch {
+                view: view as u8 + 1,
+                points: Vec::new(),
+                unexplained: 0.0,
+                isolated: true,
+                from_map: outline.map.is_some(),
+            };
             while let Some(i) = queue.pop() {
                 let [x, y, ..] = outline.points[i];
                 stretch.points.push([x, y]);
-                stretch.unexplained += excess(residual(e, view, i)) / 10.0;
+                stretch.unexplained += excess(problem, e, view, i) / 10.0;
                 let bounds = [x - LINK_PX, y - LINK_PX, x + LINK_PX, y + LINK_PX];
                 outline.grid.for_box(bounds, |range| {
                     for j in range {
                         let [qx, qy, ..] = outline.points[j];
-                        if open[j] && (Vector2::new(qx - x, qy - y)).norm() <= LINK_PX {
+                        if (Vector2::new(qx - x, qy - y)).norm() > LINK_PX {
+                            continue;
+                        }
+                        stretch.isolated &= unexplained[j];
+                        if open[j] {
                             open[j] = false;
                             queue.push(j);
                         }

@@ -13,6 +13,7 @@ mod judgement;
 mod minimise;
 mod normal;
 mod outline;
+mod outline_map;
 mod outline_params;
 mod outline_problem;
 mod point_data;

@@ -6,6 +6,7 @@ use ndarray::{Array2, ArrayView2};
 use crate::FitError;
 use crate::bucket_grid::BucketGrid;
 use crate::distance_map::DistanceMap;
+use crate::outline_map::OutlineMap;
 
 /// How far around the mask a curve that left it still learns where the mask is, px.
 const MARGIN_PX: usize = 32;
@@ -38,6 +39,8 @@ pub(crate) struct OutlineData {
     pub(crate) half_thickness_px: f64,
     /// Whether the points are midpoints of pixel pairs.
     pub(crate) digitised: bool,
+    /// The probability map that the outline was read off, if it was.
+    pub(crate) map: Option<OutlineMap>,
 }
 
 impl<V: View> Outline<V> {
@@ -74,33 +77,41 @@ impl<V: View> Outline<V> {
             return Err(FitError::NotFinite { what: "pixel", index });
         }
         let mask: Array2<bool> = image.mapv(|v| v >= level);
-        let (rows, columns) = image.dim();
-        // One-sided at the image border.
-        let gradient = |x: usize, y: usize| {
-            let (left, right) = (x.saturating_sub(1), (x + 1).min(columns - 1));
-            let (up, down) = (y.saturating_sub(1), (y + 1).min(rows - 1));
-            let across = f64::from(image[[y, right]] - image[[y, left]]);
-            let along = f64::from(image[[down, x]] - image[[up, x]]);
-            [across / (right - left).max(1) as f64, along / (down - up).max(1) as f64]
-        };
-        Self::build(&mask.view(), false, |[x, y], [inner_x, inner_y]| {
-            let (outer, inner) = (image[[y, x]], image[[inner_y, inner_x]]);
-            let fraction = f64::from((level - outer) / (inner - outer)).clamp(0.0, 1.0);
-            let (dx, dy) = (inner_x as f64 - x as f64, inner_y as f64 - y as f64);
-            let (g0, g1) = (gradient(x, y), gradient(inner_x, inner_y));
-            let g = [
-                (1.0 - fraction) * g0[0] + fraction * g1[0],
-                (1.0 - fraction) * g0[1] + fraction * g1[1],
-            ];
-            let norm = g[0].hypot(g[1]);
-            // A gradient that points out of the body is noise: the pair itself knows better.
-            let [nx, ny] = if norm > 0.0 && g[0] * dx + g[1] * dy > 0.0 {
-                [g[0] / norm, g[1] / norm]
-            } else {
-                [dx, dy]
-            };
-            [x as f64 + fraction * dx, y as f64 + fraction * dy, nx, ny]
-        })
+        Self::build(&mask.view(), false, crossing(&image, level))
+    }
+
+    /// From a probability map (`height x width`, row = y) and the mask that was made of it: around
+    /// the mask, sub-pixel, where the map crosses the least probability that the mask holds. Where
+    /// the mask ends though the map goes on, the point lies between the two pixels.
+    ///
+    /// Crossings are interpolated in the logit: the edge of a body that is known up to a normal error
+    /// is a ramp there. The slope of the ramp gives each point's variance; how far the map rises
+    /// behind it, how much an unexplained point counts; and a curve that leaves the mask is blamed
+    /// the less, the higher the map still is.
+    ///
+    /// # Errors
+    /// [`FitError::NotFinite`] for a pixel (index in row-major order), [`FitError::ShapeMismatch`],
+    /// [`FitError::EmptyOutline`] if no pixel, or every pixel, of the mask is set.
+    ///
+    /// # Cost
+    /// As [`Outline::from_mask`], and three images in memory.
+    pub fn from_probability(
+        probability: ArrayView2<'_, f32>,
+        mask: ArrayView2<'_, bool>,
+    ) -> Result<Self, FitError> {
+        if probability.dim() != mask.dim() {
+            let (expected, found) = (mask.dim(), probability.dim());
+            return Err(FitError::ShapeMismatch { view: V::NUMBER, expected, found });
+        }
+        if let Some(index) = probability.iter().position(|v| !v.is_finite()) {
+            return Err(FitError::NotFinite { what: "probability", index });
+        }
+        let mut map = OutlineMap::new(probability, mask);
+        let logits = map.logits();
+        let mut outline = Self::build(&mask, false, crossing(&logits.view(), map.level_logit()))?;
+        map.describe(&outline.data.points);
+        outline.data.map = Some(map);
+        Ok(outline)
     }
 
     fn build(
@@ -142,7 +153,8 @@ impl<V: View> Outline<V> {
         let outside = DistanceMap::new(mask, bounds, MARGIN_PX);
         let (grid, points) = BucketGrid::sort(points);
         let size = ImageSize { width: columns as u32, height: rows as u32 };
-        let data = OutlineData { points, grid, outside, size, half_thickness_px, digitised };
+        let data =
+            OutlineData { points, grid, outside, size, half_thickness_px, digitised, map: None };
         Ok(Self { data, view: PhantomData })
     }
 
@@ -168,6 +180,45 @@ impl<V: View> Outline<V> {
     /// Size of the image the outline came from.
     pub fn size(&self) -> ImageSize {
         self.data.size
+    }
+}
+
+/// The point between two pixels, `[x, y]` outside and inside, where `image` crosses `level`, and the
+/// gradient there. If it does not cross it, the point is in the middle.
+fn crossing<'i>(
+    image: &'i ArrayView2<'_, f32>,
+    level: f32,
+) -> impl Fn([usize; 2], [usize; 2]) -> [f64; 4] + 'i {
+    let (rows, columns) = image.dim();
+    // One-sided at the image border.
+    let gradient = move |x: usize, y: usize| {
+        let (left, right) = (x.saturating_sub(1), (x + 1).min(columns - 1));
+        let (up, down) = (y.saturating_sub(1), (y + 1).min(rows - 1));
+        let across = f64::from(image[[y, right]] - image[[y, left]]);
+        let along = f64::from(image[[down, x]] - image[[up, x]]);
+        [across / (right - left).max(1) as f64, along / (down - up).max(1) as f64]
+    };
+    move |[x, y], [inner_x, inner_y]| {
+        let (outer, inner) = (image[[y, x]], image[[inner_y, inner_x]]);
+        let fraction = if outer <= level && inner >= level && outer < inner {
+            f64::from((level - outer) / (inner - outer))
+        } else {
+            0.5
+        };
+        let (dx, dy) = (inner_x as f64 - x as f64, inner_y as f64 - y as f64);
+        let (g0, g1) = (gradient(x, y), gradient(inner_x, inner_y));
+        let g = [
+            (1.0 - fraction) * g0[0] + fraction * g1[0],
+            (1.0 - fraction) * g0[1] + fraction * g1[1],
+        ];
+        let norm = g[0].hypot(g[1]);
+        // A gradient that points out of the body is noise: the pair itself knows better.
+        let [nx, ny] = if norm > 0.0 && g[0] * dx + g[1] * dy > 0.0 {
+            [g[0] / norm, g[1] / norm]
+        } else {
+            [dx, dy]
+        };
+        [x as f64 + fraction * dx, y as f64 + fraction * dy, nx, ny]
     }
 }
 
@@ -226,5 +277,43 @@ mod tests {
         assert!(Outline::<View1>::from_mask(empty.view()).is_err());
         let nan = Array2::from_elem((3, 3), f32::NAN);
         assert!(Outline::<View1>::from_level_set(nan.view(), 0.5).is_err());
+    }
+
+    #[test]
+    fn a_blurred_strip_is_found_between_the_pixels_and_knows_its_blur() {
+        // Edges at columns 10.3 and 15.3, logit 4 per px: 1.6 / 4 = 0.4 px of blur.
+        let distance = |x: usize| 2.5 - (x as f64 - 12.8).abs();
+        let map = Array2::from_shape_fn((30, 30), |(_, x)| {
+            (1.0 / (1.0 + (-4.0 * distance(x)).exp())) as f32
+        });
+        let mask = map.mapv(|p| p > 0.5);
+        let outline = Outline::<View1>::from_probability(map.view(), mask.view()).unwrap();
+        assert_eq!(outline.len(), 60);
+        for p in outline.points() {
+            // A ramp in the logit: exact up to the rounding of probabilities, 6e-8, which a logit of
+            // 4 magnifies by 60, over the slope.
+            let out = (p.position.x - 12.8).abs() - 2.5;
+            assert!(out.abs() < 1e-5, "{p:?}");
+            assert!(p.inward[1].abs() < 1e-6);
+        }
+        let data = outline.data.map.as_ref().unwrap();
+        assert!(data.trust.iter().all(|t| *t > 0.99));
+        assert!(data.variance.iter().all(|v| (0.02..0.08).contains(v)), "{:?}", data.variance);
+    }
+
+    #[test]
+    fn another_shape_and_nan_in_a_map_are_refused() {
+        let mask = Array2::from_shape_fn((6, 6), |(y, _)| y == 3);
+        let other = Array2::zeros((6, 7));
+        assert!(matches!(
+            Outline::<View1>::from_probability(other.view(), mask.view()),
+            Err(FitError::ShapeMismatch { view: 1, expected: (6, 6), found: (6, 7) })
+        ));
+        let mut map = Array2::zeros((6, 6));
+        map[[1, 2]] = f32::NAN;
+        assert!(matches!(
+            Outline::<View1>::from_probability(map.view(), mask.view()),
+            Err(FitError::NotFinite { what: "probability", index: 8 })
+        ));
     }
 }

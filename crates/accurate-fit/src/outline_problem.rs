@@ -88,6 +88,9 @@ pub(crate) struct OutlineProblem<'a> {
 /// Distances beyond which a curve sample outside the mask is left alone, and within which it is
 /// taken to be inside, px.
 const OUTSIDE_PX: [f64; 2] = [1.2, 25.0];
+/// A curve sample outside the mask is left alone where the probability map doubts that it is, more
+/// than so much.
+const LEAST_DOUBT: f64 = 0.5;
 /// Half width of a bridge, px.
 const BRIDGE_HALF_PX: f64 = 4.0;
 /// An outline point is no datum if its outward normal turns more than this (cosine) away from the
@@ -135,12 +138,15 @@ impl OutlineProblem<'_> {
     /// How exactly digitisation places a boundary point whose pixel pair makes an angle of cosine
     /// `share` with the curve's normal: the inverse of its variance `share² / 12`, with a floor for
     /// what is not digitisation, relative to the mean variance 1/18.
-    fn precision(&self, view: usize, share: f64) -> f64 {
-        if self.outlines[view].digitised {
-            (1.0 / 18.0 + OTHER_VARIANCE) / (share * share / 12.0 + OTHER_VARIANCE)
-        } else {
-            1.0
-        }
+    /// A point of a probability map has the variance that the map gives it.
+    fn precision(&self, view: usize, share: f64, point: usize) -> f64 {
+        let outline = self.outlines[view];
+        let variance = match &outline.map {
+            Some(map) => map.variance[point],
+            None if outline.digitised => share * share / 12.0,
+            None => return 1.0,
+        };
+        (1.0 / 18.0 + OTHER_VARIANCE) / (variance + OTHER_VARIANCE)
     }
 
     /// Makes every row that passes the gates, and no other, a datum, with the precision of its own
@@ -155,7 +161,7 @@ impl OutlineProblem<'_> {
         for row in &mut e.rows {
             row.held = true;
             if !row.outside {
-                row.precision = self.precision(row.view, row.share);
+                row.precision = self.precision(row.view, row.share, row.point);
                 precision[row.view][row.point] = row.precision;
             }
         }
@@ -212,7 +218,8 @@ impl OutlineProblem<'_> {
             row.passes = passes;
             row.held = held;
             row.share = outward / distance;
-            row.precision = if known > 0.0 { known } else { self.precision(row.view, row.share) };
+            row.precision =
+                if known > 0.0 { known } else { self.precision(row.view, row.share, i) };
             e.rows.push(row);
         }
     }
@@ -226,6 +233,9 @@ impl OutlineProblem<'_> {
             let seen = self.outlines[view].outside.nearest(p.x, p.y);
             let Some((distance, target)) = self.outside_from(view, p, seen) else { continue };
             if distance <= OUTSIDE_PX[0] || distance > OUTSIDE_PX[1] {
+                continue;
+            }
+            if self.doubt(view, p) < LEAST_DOUBT {
                 continue;
             }
             let u = chords.parameter(k);
@@ -243,6 +253,11 @@ impl OutlineProblem<'_> {
     pub(crate) fn outside(&self, view: usize, p: &Vector2<f64>) -> Option<(f64, Vector2<f64>)> {
         let seen = self.outlines[view].outside.nearest_around(p.x, p.y);
         self.outside_from(view, p, seen)
+    }
+
+    /// How sure the probability map of a view is that there is no body around `p`; 1 without a map.
+    pub(crate) fn doubt(&self, view: usize, p: &Vector2<f64>) -> f64 {
+        self.outlines[view].map.as_ref().map_or(1.0, |map| map.doubt(p.x, p.y))
     }
 
     /// The same, with the foreground pixel `seen` nearest to the sample.

@@ -5,6 +5,7 @@
 //! - [`zhang_suen`] (as scikit-image's `skeletonize`), [`guo_hall`]: lines one pixel wide;
 //! - [`Segmenter`]: whatever finds the body in an image, with a [`Segmentation`] as its answer;
 //! - [`Skeleton`]: its endpoints, junctions and gaps, and its pixels for the stages that follow;
+//! - [`gap_hints`]: where a probability map goes on between two pieces of its mask;
 //! - [`distance_to_background`], [`median_width_px`]: how thick the wire is.
 //!
 //! # Conventions
@@ -30,6 +31,7 @@ mod bit_image;
 mod components;
 mod distance;
 mod error;
+mod gap_hints;
 mod mask;
 #[cfg(feature = "network")]
 pub mod network;
@@ -46,6 +48,7 @@ mod threshold;
 pub use components::{Components, keep_largest, remove_smaller_than};
 pub use distance::{distance_to_background, median_width_px};
 pub use error::SegError;
+pub use gap_hints::{GapHint, GapParams, gap_hints};
 pub use mask::Mask;
 pub use post_processing::PostProcessing;
 pub use segmentation::{Progress, Segmentation, Segmenter, Watch, unwatched};

@@ -27,6 +27,7 @@ mod mask;
 mod options;
 mod points;
 mod polyline;
+mod probability;
 mod projection;
 mod rigs;
 mod rng;
@@ -44,6 +45,7 @@ pub use domain::{
 pub use error::SynthError;
 pub use family::{Family, UnknownFamily};
 pub use options::{CalibrationError, CaseOptions};
+pub use probability::{ProbabilityDamage, damaged_probabilities};
 pub use rng::case_rng;
 pub use tangency::TangentStretch;
 pub use xray::{XrayOptions, XrayResponse, render_xray};

@@ -185,13 +185,17 @@ fn require_segmented(pair: &ViewPair) -> Result<(), Error> {
     }
 }
 
-/// Our own method on masks.
+/// Our own method on masks, and on the maps that they were made of.
 fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
     let masks = pair
         .masks
         .as_ref()
         .ok_or_else(|| Error::MissingInput { case: pair.id.clone(), input: params.input })?;
-    let result = reconstruct_masks(masks, &pair.rig, &params.robust, &pair.id)?;
+    let maps = pair
+        .probabilities
+        .as_ref()
+        .filter(|_| params.input == InputKind::Image && params.robust.by_probability);
+    let result = reconstruct_masks(masks, maps, &pair.rig, &params.robust, &pair.id)?;
     // The curve was fitted under the corrected camera, if one was asked for.
     let rig = match &result.calibration {
         Some(calibration) => &calibration

@@ -2,7 +2,6 @@ use accurate_geom::Point2;
 use ndarray::Array2;
 use rand::RngExt;
 
-use super::stroke::{Profile, Stroke, add_stroke};
 use super::target::Target;
 use super::wander::log_uniform;
 use super::{XrayDomain, XraySample, in_image, label};
@@ -47,15 +46,7 @@ pub fn draw_xray_onto(
         |p: &Point2| in_image(p, side as f64, target.shaft_px),
     );
     let mut depth = Array2::zeros((side, side));
-    add_stroke(
-        &mut depth,
-        &Stroke {
-            points: &target.points,
-            radius_px: &|s| target.radius_px(s),
-            depth: &|s| wire_depth * target.density(s),
-            profile: Profile::Solid,
-        },
-    );
+    target.add_to(&mut depth, wire_depth);
     let mut passed = depth.mapv(|d: f64| (-d).exp());
     blur(&mut passed, sigma_px);
     let mut image = background.clone();

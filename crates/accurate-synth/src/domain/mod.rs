@@ -32,7 +32,6 @@ use crate::options::within;
 use crate::rng::named_rng;
 use aperture::Aperture;
 use detector::{Exposure, draw_exposure};
-use stroke::{Profile, Stroke, add_stroke};
 use target::Target;
 use wander::log_uniform;
 
@@ -234,15 +233,7 @@ pub fn draw_xray(domain: &XrayDomain, seed: u64, index: u64) -> Result<XraySampl
     }
     device::add_devices(&mut stream("devices"), &mut depth, target.as_ref(), wire_depth);
     if let Some(target) = &target {
-        add_stroke(
-            &mut depth,
-            &Stroke {
-                points: &target.points,
-                radius_px: &|s| target.radius_px(s),
-                depth: &|s| wire_depth * target.density(s),
-                profile: Profile::Solid,
-            },
-        );
+        target.add_to(&mut depth, wire_depth);
     }
 
     let mut image = exposure.take(&depth, &aperture, &mut stream("noise"));

@@ -2,9 +2,11 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use accurate_geom::Point2;
 use nalgebra::{Rotation2, Vector2};
+use ndarray::Array2;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::stroke::{Profile, Stroke, add_stroke};
 use super::wander::{STEP_PX, Tip, Wander, entry, log_uniform};
 use crate::Family;
 use crate::polyline::arc_lengths;
@@ -30,6 +32,19 @@ pub(crate) struct Target {
 }
 
 impl Target {
+    /// Adds its optical depth, `wire_depth` across the shaft.
+    pub fn add_to(&self, depth: &mut Array2<f64>, wire_depth: f64) {
+        add_stroke(
+            depth,
+            &Stroke {
+                points: &self.points,
+                radius_px: &|s| self.radius_px(s),
+                depth: &|s| wire_depth * self.density(s),
+                profile: Profile::Solid,
+            },
+        );
+    }
+
     /// A wire of `width_px`, at least partly in the image.
     pub fn draw(rng: &mut ChaCha8Rng, side: f64, width_px: f64) -> Self {
         let mut points = shape(rng, side);

@@ -1,7 +1,9 @@
 use accurate_fit::Outline;
 use accurate_geom::{Pixel, View};
 use accurate_match::{FreeEnds, SignalCurve};
-use accurate_seg::{Mask, distance_to_background, zhang_suen};
+use accurate_seg::{
+    GapHint, GapParams, Mask, distance_to_background, gap_hints, median_width_px, zhang_suen,
+};
 use accurate_traverse::{
     GraphParams, HalfEdge, SkeletonGraph, Walk, WalkEnd, WalkParams, fill_small_holes,
     k_best_walks_with_reward,
@@ -24,23 +26,44 @@ pub(crate) struct ViewCandidates<V: View> {
     graph: SkeletonGraph<V>,
     /// Where the cut image begins, px.
     origin: [f64; 2],
+    /// Both ends of every gap that the probability map leads over.
+    hinted_ends: Vec<[f64; 2]>,
 }
 
 impl<V: View> ViewCandidates<V> {
     /// # Errors
     /// [`Error::Segmentation`], [`Error::Traversal`] or [`Error::Fitting`] for a mask that shows no
     /// curve.
-    pub(crate) fn of(array: &Array2<bool>, params: &WalkParams, case: &str) -> Result<Self, Error> {
+    pub(crate) fn of(
+        array: &Array2<bool>,
+        probability: Option<&Array2<f32>>,
+        params: &WalkParams,
+        case: &str,
+    ) -> Result<Self, Error> {
         let segmentation =
             |source| Error::Segmentation { case: case.to_owned(), view: V::NUMBER, source };
         let traversal = |source| Error::Traversal { case: case.to_owned(), source };
         let fitting = |source| Error::Fitting { case: case.to_owned(), source };
         let whole = Mask::from_array(array.clone()).map_err(segmentation)?;
         whole.require_foreground().map_err(segmentation)?;
-        let outline = Outline::from_mask(array.view()).map_err(fitting)?;
+        let outline = match probability {
+            Some(map) => Outline::from_probability(map.view(), array.view()),
+            None => Outline::from_mask(array.view()),
+        }
+        .map_err(fitting)?;
 
-        let (cut, origin) = cut_to_body(array);
-        let mask = Mask::from_array(cut.clone()).map_err(segmentation)?;
+        let hints = match probability {
+            Some(map) => gap_hints(map, &whole, &GapParams::DEFAULT).map_err(segmentation)?,
+            None => Vec::new(),
+        };
+        let (mut cut, origin) = cut_to_body(array);
+        let mut mask = Mask::from_array(cut.clone()).map_err(segmentation)?;
+        if !hints.is_empty() {
+            // The graph alone walks over hints; the fit judges by what the map shows.
+            let half_px = 0.5 * median_width_px(&mask).map_err(segmentation)?;
+            hints.iter().for_each(|hint| draw(&mut cut, hint, origin, half_px));
+            mask = Mask::from_array(cut.clone()).map_err(segmentation)?;
+        }
         let mut thin = zhang_suen(&mask);
         let mut radii = distance_to_background(&mask).map_err(segmentation)?;
         let thickness = median_width(&thin, &radii);
@@ -55,13 +78,19 @@ impl<V: View> ViewCandidates<V> {
         let graph = SkeletonGraph::new(thin.as_array(), &radii, thickness, &GraphParams::DEFAULT)
             .map_err(traversal)?;
         let shifted = |p: &Pixel<V>| Pixel::new(p.x + origin[0], p.y + origin[1]);
-        let bridges = graph
+        let mut bridges: Vec<_> = graph
             .edges()
             .iter()
             .filter(|edge| edge.link)
             .flat_map(|edge| edge.points.windows(2).map(|w| (shifted(&w[0]), shifted(&w[1]))))
             .collect();
-        let mut view = Self { outline, walks: Vec::new(), bridges, graph, origin };
+        let mut hinted_ends = Vec::new();
+        for hint in &hints {
+            let line = stations::<V>(hint);
+            hinted_ends.extend(line.first().iter().chain(&line.last()).map(|p| [p.x, p.y]));
+            bridges.extend(line.windows(2).map(|w| (w[0], w[1])));
+        }
+        let mut view = Self { outline, walks: Vec::new(), bridges, graph, origin, hinted_ends };
         view.walk(params, &[], case)?;
         Ok(view)
     }
@@ -91,7 +120,7 @@ impl<V: View> ViewCandidates<V> {
         Ok(())
     }
 
-    /// Where a walk takes bridges: both ends of each.
+    /// Where a walk takes bridges, and where the map leads over gaps: both ends of each.
     pub(crate) fn cut_ends(&self, walk: usize) -> Vec<[f64; 2]> {
         let edges = self.graph.edges();
         self.walks[walk]
@@ -102,6 +131,7 @@ impl<V: View> ViewCandidates<V> {
             .flat_map(|edge| [edge.points.first(), edge.points.last()])
             .flatten()
             .map(|p| [p.x + self.origin[0], p.y + self.origin[1]])
+            .chain(self.hinted_ends.iter().copied())
             .collect()
     }
 
@@ -150,6 +180,35 @@ impl<V: View> ViewCandidates<V> {
                 free: free_ends(walk),
             })
             .collect()
+    }
+}
+
+/// A hint as a polyline with a vertex every few pixels, in the whole image.
+fn stations<V: View>(hint: &GapHint) -> Vec<Pixel<V>> {
+    const EVERY: usize = 6;
+    let last = hint.path.len().saturating_sub(1);
+    (0..=last)
+        .step_by(EVERY)
+        .filter(|k| last - k >= EVERY || *k == 0)
+        .chain([last])
+        .map(|k| Pixel::new(hint.path[k].1 as f64, hint.path[k].0 as f64))
+        .collect()
+}
+
+/// Draws the body over a gap into the mask that begins at `origin`.
+fn draw(cut: &mut Array2<bool>, hint: &GapHint, origin: [f64; 2], half_px: f64) {
+    let reach = half_px.ceil() as isize;
+    for &(row, column) in &hint.path {
+        let (y, x) = (row as isize - origin[1] as isize, column as isize - origin[0] as isize);
+        for (dy, dx) in (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dy, dx))) {
+            let near = ((dy * dy + dx * dx) as f64).sqrt() <= half_px;
+            let at = (usize::try_from(y + dy), usize::try_from(x + dx));
+            if let (true, (Ok(y), Ok(x))) = (near, at)
+                && let Some(pixel) = cut.get_mut([y, x])
+            {
+                *pixel = true;
+            }
+        }
     }
 }
 

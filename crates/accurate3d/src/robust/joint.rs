@@ -41,6 +41,10 @@ pub struct RobustParams {
     pub good_distance_px: f64,
     /// Weight of the walks' own cost in the final choice.
     pub walk_weight: f64,
+    /// Whether a pair from images is judged by the probability maps themselves, and walks are led
+    /// over gaps by them; else by the masks alone. Off: on networks' maps its gain is not measured
+    /// yet (`examples/probability_study.rs` does).
+    pub by_probability: bool,
     /// How wrong the calibration of view 2 may be; `None`: it is exact. Else a shift of image 2 and a
     /// roll of its camera are unknowns, and the search is repeated with the rig so corrected.
     pub calibration: Option<CalibrationPriors>,
@@ -61,6 +65,7 @@ impl RobustParams {
         good_chi_per_point: 0.062,
         good_distance_px: 1.0,
         walk_weight: 0.3,
+        by_probability: false,
         calibration: None,
     };
 }
@@ -89,18 +94,20 @@ pub(crate) struct JointResult {
 /// Curves nowhere farther apart than this do not compete, px.
 const RIVAL_PX: f64 = 5.0;
 
-/// Proposes, pairs, fits, judges.
+/// Proposes, pairs, fits, judges; by the probability maps behind the masks, where they are given.
 ///
 /// # Errors
 /// [`Error`] of a view that shows no curve; [`Error::NoCandidate`] if no pair of walks gives one.
 pub(crate) fn reconstruct_masks(
     masks: &[Array2<bool>; 2],
+    probabilities: Option<&[Array2<f32>; 2]>,
     rig: &Rig,
     params: &RobustParams,
     case: &str,
 ) -> Result<JointResult, Error> {
-    let mut view1 = ViewCandidates::<View1>::of(&masks[0], &params.walks, case)?;
-    let mut view2 = ViewCandidates::<View2>::of(&masks[1], &params.walks, case)?;
+    let map = |view: usize| probabilities.map(|both| &both[view]);
+    let mut view1 = ViewCandidates::<View1>::of(&masks[0], map(0), &params.walks, case)?;
+    let mut view2 = ViewCandidates::<View2>::of(&masks[1], map(1), &params.walks, case)?;
     let (outline1, outline2) = (view1.outline.clone(), view2.outline.clone());
     let outlines = OutlinePair::new(&outline1, &outline2)
         .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));

@@ -10,6 +10,11 @@ use crate::ConsideredCurve;
 const CUT_PX: f64 = 5.0;
 /// A cut face leaves no more than this unexplained.
 const CUT_UNEXPLAINED: f64 = 0.3;
+/// A piece of outline by itself, on a probability map, that the curve passes by: a segmentation adds
+/// short pieces, and misses the body rather than to invent a long one. Up to the first number of
+/// points it counts as the share says, from the second on in full.
+const STRAY_POINTS: [f64; 2] = [120.0, 300.0];
+const STRAY_SHARE: f64 = 0.1;
 /// Weights in a score, all on half a squared px of residual. Of pairs of curves that explain the
 /// outlines, the less bent one is right more often: the other bends to serve the noise.
 const MISFIT: f64 = 2.0;
@@ -35,7 +40,20 @@ fn unexplained(fit: &OutlineFit, cuts: &CutEnds) -> f64 {
         .filter(|stretch| cut(stretch.view, &stretch.points))
         .map(|stretch| stretch.unexplained.min(CUT_UNEXPLAINED))
         .sum();
-    (fit.judgement.unexplained - faces).max(0.0)
+    (fit.judgement.unexplained - faces - strays(fit)).max(0.0)
+}
+
+/// What need not be explained of pieces of a segmentation that are none of the body.
+fn strays(fit: &OutlineFit) -> f64 {
+    let pieces = fit.unexplained.iter().filter(|stretch| stretch.isolated && stretch.from_map);
+    pieces
+        .map(|piece| {
+            let points = piece.points.len() as f64;
+            let [from, to] = STRAY_POINTS;
+            let share = STRAY_SHARE + (1.0 - STRAY_SHARE) * ((points - from) / (to - from));
+            (1.0 - share.clamp(STRAY_SHARE, 1.0)) * piece.unexplained
+        })
+        .sum()
 }
 
 /// A fitted curve with all that counts in the choice.

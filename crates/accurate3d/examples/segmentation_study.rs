@@ -1,0 +1,167 @@
+//! A segmentation network on labelled X-ray images: its scores, and the post-processing that suits it.
+//!
+//! `cargo run --release -p accurate3d --features rten --example segmentation_study -- WHAT MODEL SEED COUNT [IMAGE...]`
+//!
+//! WHAT is `score` (recall, precision and clDice at 2 px, with the model's own post-processing) or
+//! `tune` (the same over a grid of thresholds, smallest pieces and spurs; the best are printed last;
+//! seed 1500 is for this). With images, wires are drawn onto their middle squares instead of onto
+//! generated anatomy, and COUNT images are made of them in turn.
+#![allow(clippy::print_stdout)]
+
+use std::error::Error;
+use std::path::Path;
+
+use accurate3d::eval::{cl_dice, skeleton_agreement};
+use accurate3d::io::{read_file, read_grey};
+use accurate3d::seg::network::{
+    MAX_MODEL_BYTES, ModelBundle, NetworkOptions, NetworkSegmenter, RtenEngine,
+};
+use accurate3d::seg::{Mask, PostProcessing, Segmenter, unwatched, zhang_suen};
+use accurate3d::synth::{XrayDomain, XraySample, draw_xray, draw_xray_onto};
+use ndarray::Array2;
+use rayon::prelude::*;
+
+/// Side of the images, px.
+const SIDE: usize = 512;
+/// Tolerance of recall and precision, px.
+const TOLERANCE_PX: f64 = 2.0;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let [what, model, seed, count, backgrounds @ ..] = args.as_slice() else {
+        return Err("give score or tune, a model, a seed and a number of images".into());
+    };
+    let (seed, count): (u64, u64) = (seed.parse()?, count.parse()?);
+    let bundle = ModelBundle::read(read_file(Path::new(model), MAX_MODEL_BYTES)?.into())?;
+    let own = bundle.manifest().postprocessing;
+    let engine = Box::new(RtenEngine::new(&bundle, rayon::current_num_threads())?);
+    let segmenter = NetworkSegmenter::new(&bundle, engine, NetworkOptions::DEFAULT)?;
+    let backgrounds: Vec<Array2<u8>> =
+        backgrounds.iter().map(|file| square_of(Path::new(file))).collect::<Result<_, _>>()?;
+
+    let mut seen = Vec::new();
+    for index in 0..count {
+        let sample = sample(seed, index, &backgrounds)?;
+        if sample.mask.iter().any(|set| *set) {
+            let image = sample.image.mapv(f32::from);
+            seen.push((segmenter.segment(&image, &unwatched)?.probability, sample.mask));
+        }
+    }
+    println!("{} of {count} images show a wire; {}", seen.len(), segmenter.describe());
+    match what.as_str() {
+        "score" => println!("{}", Scores::of(&seen, own)?),
+        "tune" => tune(&seen)?,
+        _ => return Err(format!("`{what}` is neither score nor tune").into()),
+    }
+    Ok(())
+}
+
+fn sample(seed: u64, index: u64, onto: &[Array2<u8>]) -> Result<XraySample, Box<dyn Error>> {
+    let domain = XrayDomain { side_px: SIDE as u32, ..XrayDomain::default() };
+    Ok(match onto.len() as u64 {
+        0 => draw_xray(&domain, seed, index)?,
+        n => draw_xray_onto(&domain, &onto[(index % n) as usize], seed, index)?,
+    })
+}
+
+/// The middle of an image, 8 bits from its darkest to its brightest pixel.
+fn square_of(path: &Path) -> Result<Array2<u8>, Box<dyn Error>> {
+    let values = read_grey(path)?.values;
+    let (rows, columns) = values.dim();
+    if rows < SIDE || columns < SIDE {
+        return Err(format!("{}: smaller than {SIDE} x {SIDE}", path.display()).into());
+    }
+    let (top, left) = ((rows - SIDE) / 2, (columns - SIDE) / 2);
+    let (least, most) =
+        values.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
+    let scale = 255.0 / (most - least).max(f32::MIN_POSITIVE);
+    Ok(Array2::from_shape_fn((SIDE, SIDE), |(y, x)| {
+        ((values[[top + y, left + x]] - least) * scale).round() as u8
+    }))
+}
+
+/// Means over images; one in which nothing was found counts as 0 in recall and clDice, and not in
+/// precision.
+struct Scores {
+    recall: f64,
+    precision: f64,
+    cl_dice: f64,
+    nothing_found: usize,
+}
+
+impl Scores {
+    fn of(
+        seen: &[(Array2<f32>, Array2<bool>)],
+        post: PostProcessing,
+    ) -> Result<Self, Box<dyn Error>> {
+        let each = seen
+            .par_iter()
+            .map(|(map, truth)| {
+                let found = post.mask_of(map).map_err(|e| e.to_string())?;
+                if found.is_empty() {
+                    return Ok(None);
+                }
+                let thin = zhang_suen(&found);
+                let true_mask = Mask::from_array(truth.clone()).map_err(|e| e.to_string())?;
+                let true_thin = zhang_suen(&true_mask);
+                let (a, b) = (thin.as_array().view(), true_thin.as_array().view());
+                let agreement =
+                    skeleton_agreement(a, b, TOLERANCE_PX).map_err(|e| e.to_string())?;
+                let dice = cl_dice(found.as_array().view(), truth.view(), a, b)
+                    .map_err(|e| e.to_string())?;
+                Ok(Some([agreement.recall, agreement.precision, dice]))
+            })
+            .collect::<Result<Vec<_>, String>>()?;
+        let found: Vec<[f64; 3]> = each.iter().flatten().copied().collect();
+        let sum = |k: usize| found.iter().map(|v| v[k]).sum::<f64>();
+        let (all, some) = (each.len().max(1) as f64, found.len().max(1) as f64);
+        Ok(Self {
+            recall: sum(0) / all,
+            precision: sum(1) / some,
+            cl_dice: sum(2) / all,
+            nothing_found: each.len() - found.len(),
+        })
+    }
+
+    /// The harmonic mean of recall and precision.
+    fn f_score(&self) -> f64 {
+        2.0 * self.recall * self.precision / (self.recall + self.precision).max(f64::MIN_POSITIVE)
+    }
+}
+
+impl std::fmt::Display for Scores {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "recall {:.4} precision {:.4} F {:.4} clDice {:.4}, nothing found in {}",
+            self.recall,
+            self.precision,
+            self.f_score(),
+            self.cl_dice,
+            self.nothing_found
+        )
+    }
+}
+
+fn tune(seen: &[(Array2<f32>, Array2<bool>)]) -> Result<(), Box<dyn Error>> {
+    let mut all = Vec::new();
+    for high in [0.3, 0.4, 0.5, 0.6, 0.7] {
+        for share in [0.4, 0.6, 0.8, 1.0] {
+            for min_length_px in [0, 12, 20, 30] {
+                for max_spur_px in [0, 4, 8] {
+                    let post =
+                        PostProcessing { low: high * share, high, min_length_px, max_spur_px };
+                    all.push((Scores::of(seen, post)?, post));
+                }
+            }
+        }
+    }
+    all.sort_by(|a, b| a.0.f_score().total_cmp(&b.0.f_score()));
+    for (scores, post) in &all[all.len().saturating_sub(20)..] {
+        println!(
+            "low {:.2} high {:.2} smallest {:2} spur {}: {scores}",
+            post.low, post.high, post.min_length_px, post.max_spur_px
+        );
+    }
+    Ok(())
+}
