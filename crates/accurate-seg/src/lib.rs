@@ -5,7 +5,7 @@
 //! - [`zhang_suen`] (as scikit-image's `skeletonize`), [`guo_hall`]: lines one pixel wide;
 //! - [`Segmenter`]: whatever finds the body in an image, with a [`Segmentation`] as its answer;
 //! - [`Skeleton`]: its endpoints, junctions and gaps, and its pixels for the stages that follow;
-//! - [`gap_hints`]: where a probability map goes on between two pieces of its mask;
+//! - [`gap_hints()`]: where a probability map goes on between two pieces of its mask;
 //! - [`distance_to_background`], [`median_width_px`]: how thick the wire is.
 //!
 //! # Conventions
