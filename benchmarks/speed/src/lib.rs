@@ -1,1 +1,5 @@
-//! Speed benchmarks live in `benches/`; this crate has no code of its own.
+//! What the speed measurements share: their inputs.
+
+mod workloads;
+
+pub use workloads::{Images, Wire, wire_mask};
