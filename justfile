@@ -43,6 +43,18 @@ report:
 check-report:
     bash web/report/check
 
+# Every figure that `accurate` mode promises on generated data, beside `paper` mode (docs/results.md).
+acceptance *ARGS:
+    cargo run --release -p accurate3d --example acceptance -- {{ARGS}}
+
+# What each step of `accurate` mode buys (docs/deviations.md).
+ablation CASES="30" SEED="1003":
+    cargo run --release -p accurate3d --example ablation -- {{CASES}} {{SEED}}
+
+# How often 95 % ellipses hold the truth, over 143 wires of each of 7 families.
+coverage WIRES="143" SEED="1905":
+    cargo run --release -p accurate-fit --example coverage -- {{WIRES}} {{SEED}}
+
 # The book, if mdbook is installed.
 book:
     mdbook build docs

@@ -5,7 +5,7 @@ use crate::curve::to_curve;
 use crate::judgement::{Judgement, UnexplainedStretch, judge, unexplained_stretches};
 use crate::minimise::{Minimiser, Priors};
 use crate::outline_params::{SmoothnessScale, final_settings};
-use crate::outline_problem::{OutlineProblem, State};
+use crate::outline_problem::{OutlineProblem, Settings, State};
 use crate::pose::pose;
 use crate::projector::Nuisance;
 use crate::selected_inverse::SelectedInverse;
@@ -109,6 +109,7 @@ pub(crate) fn run<'a>(
     let half_px = [0, 1].map(|v| problem.outlines[v].half_thickness_px);
     let start = State { spline, half_px, nuisance: Nuisance::default() };
     let mut minimiser = Minimiser::new(problem, start, params.damping, priors)?;
+    let last = final_settings(params, &scale);
     let mut steps = 0;
     let mut converged = false;
     for iteration in 0..params.iterations {
@@ -116,12 +117,12 @@ pub(crate) fn run<'a>(
         let drop = minimiser.step(&settings)?;
         steps += 1;
         // Not before the schedule has arrived at its last settings.
-        if drop < params.tolerance && settings == final_settings(params, &scale) {
+        if drop < params.tolerance && settings == (Settings { judged: false, ..last }) {
             converged = true;
             break;
         }
     }
-    minimiser.refresh(&final_settings(params, &scale))?;
+    minimiser.refresh(&last)?;
     Ok((minimiser, steps, converged))
 }
 

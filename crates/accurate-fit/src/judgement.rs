@@ -25,6 +25,9 @@ pub struct Judgement {
     pub used: [usize; 2],
     /// Boundary points, by view.
     pub points: [usize; 2],
+    /// The largest mean of squared residuals, each at most 4 px², over five knot spans in either view:
+    /// a stretch that follows the wrong strand shows here before it shows in the sum.
+    pub worst_chi_per_point: f64,
     /// `∫ κ² ds`, 1/px.
     pub bending: f64,
 }
@@ -92,15 +95,33 @@ pub(crate) fn judge(problem: &OutlineProblem<'_>, e: &Evaluation) -> Judgement {
     }
     let mut chi = 0.0;
     let mut used = [0; 2];
+    let mut by_span = [(); 2].map(|()| vec![(0.0, 0usize); e.state.spline.spans()]);
     for row in e.rows.iter().filter(|row| row.passes && !row.outside) {
         let r = row.distance - e.state.half_px[row.view];
         // Points of a map differ in what they are worth; those of a mask differ by direction only.
         let worth = if problem.outlines[row.view].map.is_some() { row.precision } else { 1.0 };
-        chi += (worth * r * r).min(4.0);
+        let squared = (worth * r * r).min(4.0);
+        chi += squared;
         used[row.view] += 1;
+        let (sum, count) = &mut by_span[row.view][row.span];
+        *sum += squared;
+        *count += 1;
     }
     let bending = e.state.spline.bending() / problem.px_per_unit;
-    Judgement { unexplained, outside, chi, used, points, bending }
+    let worst_chi_per_point = by_span.iter().map(|spans| worst_window(spans)).fold(0.0, f64::max);
+    Judgement { unexplained, outside, chi, used, points, worst_chi_per_point, bending }
+}
+
+/// The largest mean over five spans in a row, given the sum and the number of each; windows of a few
+/// points do not count.
+fn worst_window(spans: &[(f64, usize)]) -> f64 {
+    const SPANS: usize = 5;
+    const FEWEST: usize = 20;
+    let mean = |window: &[(f64, usize)]| {
+        let (sum, count) = window.iter().fold((0.0, 0), |(s, n), w| (s + w.0, n + w.1));
+        if count < FEWEST { 0.0 } else { sum / count as f64 }
+    };
+    spans.windows(SPANS.min(spans.len().max(1))).map(mean).fold(0.0, f64::max)
 }
 
 /// Clusters of boundary points with a misfit beyond 0.8 px; points within 3 px are one cluster.

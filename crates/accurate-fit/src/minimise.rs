@@ -49,9 +49,11 @@ impl<'a> Minimiser<'a> {
 
     /// Brings residuals and association of the current state up to date with `settings`.
     pub(crate) fn refresh(&mut self, settings: &Settings) -> Result<(), FitError> {
-        let fresh = self
-            .evaluated
-            .is_some_and(|was| was.stride == settings.stride && was.reach_px == settings.reach_px);
+        let fresh = self.evaluated.is_some_and(|was| {
+            was.stride == settings.stride
+                && was.reach_px == settings.reach_px
+                && (was.judged || !settings.judged)
+        });
         if !fresh {
             self.current.precision = Default::default();
             self.problem.evaluate(&mut self.current, settings)?;

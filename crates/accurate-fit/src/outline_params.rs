@@ -119,6 +119,7 @@ impl OutlineFitParams {
             lambda2: self.lambda2 * scale.second,
             lambda3: lambda3 * scale.third,
             outside_weight: self.outside_weight,
+            judged: false,
         }
     }
 }
@@ -145,5 +146,5 @@ impl SmoothnessScale {
 pub(crate) fn final_settings(params: &OutlineFitParams, scale: &SmoothnessScale) -> Settings {
     let last = OutlineFitParams { subsample: false, ..*params };
     let settings = last.settings(params.iterations.max(1) + 2, scale);
-    Settings { scale_px: params.cauchy_scale_px, ..settings }
+    Settings { scale_px: params.cauchy_scale_px, judged: true, ..settings }
 }

@@ -30,6 +30,9 @@ pub(crate) struct Settings {
     pub(crate) lambda3: f64,
     /// Weight of a curve sample outside the mask, per px of length.
     pub(crate) outside_weight: f64,
+    /// Whether nearest points are looked for as far as [`judge`](crate::judgement::judge) needs them,
+    /// or only as far as they are data.
+    pub(crate) judged: bool,
 }
 
 /// One residual `|q - x(u)| - offset` of a projected curve point.
@@ -100,6 +103,8 @@ const MIN_COSINE: f64 = 0.2;
 const MIN_DEPTH: f64 = 0.3;
 /// Variance of a boundary point besides digitisation, px²: 0.07 px rendering and model error.
 const OTHER_VARIANCE: f64 = 0.005;
+/// A body with a smaller half thickness is drawn as one row of pixels, px.
+const ONE_PIXEL_HALF_PX: f64 = 0.75;
 /// Residuals are looked for at least so far for [`Judgement`](crate::Judgement), px.
 pub(crate) const JUDGED_PX: f64 = 4.8;
 
@@ -125,14 +130,24 @@ impl OutlineProblem<'_> {
                 projector.set_nuisance(e.state.nuisance);
             }
             let half = e.state.half_px[view];
-            e.chords[view].rebuild(&e.state.spline, &projector, view as u8 + 1, self.steps)?;
-            let radius = half + settings.reach_px.max(JUDGED_PX);
+            let least = if settings.judged { JUDGED_PX } else { 0.0 };
+            let steps = self.steps_for(settings);
+            e.chords[view].rebuild(&e.state.spline, &projector, view as u8 + 1, steps)?;
+            let radius = half + settings.reach_px.max(least);
             let outline = self.outlines[view];
             e.chords[view].nearest(outline, radius, settings.stride, &mut e.nearest[view]);
             self.boundary_rows(e, view, &projector, settings);
             self.outside_rows(e, view, &projector);
         }
         Ok(())
+    }
+
+    /// Chords per span. The parameter of a nearest point is refined on the curve itself, so that longer
+    /// chords will do where nothing is judged by their points: but not for a body that is thinner than
+    /// a sharp bend's chords are off.
+    fn steps_for(&self, settings: &Settings) -> usize {
+        let thick = self.outlines.iter().all(|o| o.half_thickness_px >= ONE_PIXEL_HALF_PX);
+        if settings.judged || !thick { self.steps } else { self.steps.div_ceil(2).max(2) }
     }
 
     /// How exactly digitisation places a boundary point whose pixel pair makes an angle of cosine
@@ -442,6 +457,7 @@ mod tests {
                 lambda2: 0.1 * problem.px_per_unit.powi(2),
                 lambda3: 0.3 * problem.px_per_unit.powi(2),
                 outside_weight: 0.0,
+                judged: false,
             };
             let nuisance = Nuisance { shift_px: [0.2, -0.1], roll: 1e-3 };
             let state = State { spline, half_px: [1.0, 1.2], nuisance };

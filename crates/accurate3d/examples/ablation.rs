@@ -6,7 +6,7 @@
 
 use accurate3d::eval::{curve_scores, quantile};
 use accurate3d::synth::{CaseOptions, Family, generate};
-use accurate3d::{InputKind, Method, Params, RobustParams, ViewPair, reconstruct};
+use accurate3d::{InputKind, Method, Params, RobustParams, SecondLook, ViewPair, reconstruct};
 use rayon::prelude::*;
 
 const RIGHT_PX: f64 = 5.0;
@@ -56,6 +56,7 @@ fn variants() -> Vec<(&'static str, Params)> {
         ),
         ("convergence before the last choice", with(|r| r.finalists = 1)),
         ("repair of ends and uncovered outline", with(|r| r.repaired = 0)),
+        ("a second look in doubt", with(|r| r.second_look = SecondLook::Never)),
         ("the walks' own cost in the choice", with(|r| r.walk_weight = 0.0)),
         ("angles in the proposals", with(|r| r.propose.energy_weight = 0.0)),
         ("everything (paper mode)", Params::new(InputKind::Mask, Method::Paper)),

@@ -1,5 +1,5 @@
 //! How well `accurate` does on generated masks, case by case, beside a fit that starts from the truth:
-//! `cargo run -p accurate3d --example joint_study -- hard 1000 24 [--discs 1] [--turn 0.05] [--shift 0.3] [--nuisance]`.
+//! `cargo run -p accurate3d --example joint_study -- hard 1000 24 [--discs 1] [--turn 0.05] [--shift 0.3] [--nuisance] [--always]`.
 //!
 //! Every line shows what the method says about itself (un, off, chi per point, margin, mean epipolar
 //! distance) and what the truth says (Hausdorff in px, Overall and Max of the table in world units).
@@ -17,7 +17,7 @@ use accurate3d::fit::{
 };
 use accurate3d::geom::{Curve3, Point3, Rig, View1, View2};
 use accurate3d::synth::{CalibrationError, CaseOptions, Family, generate};
-use accurate3d::{InputKind, Method, Params, ViewPair, reconstruct};
+use accurate3d::{InputKind, Method, Params, SecondLook, ViewPair, reconstruct};
 use rayon::prelude::*;
 
 struct Line {
@@ -49,11 +49,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         }),
         ..CaseOptions::default()
     };
-    let nuisance = has(&args, "--nuisance");
+    let (nuisance, always) = (has(&args, "--nuisance"), has(&args, "--always"));
     let lines: Vec<Line> = (from..from + cases)
         .into_par_iter()
         .map(|index| {
-            study(family, seed, index, &options, nuisance).map_err(|e| format!("{index}: {e}"))
+            study(family, seed, index, &options, nuisance, always)
+                .map_err(|e| format!("{index}: {e}"))
         })
         .collect::<Result<_, _>>()?;
     if !quiet {
@@ -78,6 +79,7 @@ fn study(
     index: u64,
     options: &CaseOptions,
     nuisance: bool,
+    always: bool,
 ) -> Result<Line, Box<dyn Error + Send + Sync>> {
     let case = generate(family, seed, index, options)?;
     let (rig, truth) = (case.rig.clone(), case.truth.clone());
@@ -86,6 +88,9 @@ fn study(
     let clock = Instant::now();
     let mut params = Params::new(InputKind::Mask, Method::Accurate);
     params.robust.calibration = nuisance.then_some(CalibrationPriors::DEFAULT);
+    if always {
+        params.robust.second_look = SecondLook::Always;
+    }
     let found = reconstruct(&pair, &params)?;
     let seconds = clock.elapsed().as_secs_f64();
 

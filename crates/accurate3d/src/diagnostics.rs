@@ -6,7 +6,7 @@ use accurate_match::{CurveReconstruction, FreeMatch};
 use serde::Serialize;
 
 use crate::Traces;
-use crate::robust::{JointResult, Suspicion};
+use crate::robust::{Evidence, JointResult, Suspicion};
 
 /// How far a reconstruction can be trusted, without knowing the truth.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -129,6 +129,8 @@ pub struct OutlineDiagnostics {
     pub margin: Option<f64>,
     /// Pairs of walks that were fitted.
     pub fits: usize,
+    /// What bears on whether the curve is the right one.
+    pub evidence: Evidence,
 }
 
 impl Diagnostics {
@@ -150,6 +152,7 @@ impl Diagnostics {
                 chi_per_point: judgement.chi_per_point(),
                 margin: result.margin.is_finite().then_some(result.margin),
                 fits: result.fits,
+                evidence: result.evidence,
             }),
             calibration: result.calibration.as_ref().map(CalibrationDiagnostics::from),
             not_adjusted: None,

@@ -3,10 +3,10 @@ use accurate_geom::nalgebra::Matrix3;
 use accurate_geom::{Pixel, Point3, Rig, View, View1, View2};
 use accurate_match::{CurvePoint, FreeMatch, FreeMatcher};
 
+use super::adjusted::Adjusted;
 use super::part::filled;
 use crate::diagnostics::Adjustment;
-use crate::sampled_curve::along_epipolar_lines;
-use crate::{Diagnostics, Error, Explanation, Params, Reconstruction, Traces, ViewPair};
+use crate::{Error, Params, Reconstruction, ViewPair};
 
 /// Ordered points of a closed curve in both views; the first is not repeated at the end.
 pub(crate) struct Ring<'a> {
@@ -60,27 +60,11 @@ pub(crate) fn closed_points(
         }
         Err(source) => return Err(Error::Fitting { case: case(), source }),
     };
-    let along_epipolar_line = along_epipolar_lines(&points, &rig).map_err(matching)?;
-    let mut diagnostics = Diagnostics::of_free_match(
-        &matched,
-        [points1.len(), points2.len()],
-        &along_epipolar_line,
-        adjustment,
-    );
-    diagnostics.closed = true;
-    diagnostics.trace_coverage = ring.coverage;
-    Ok(Reconstruction {
-        id: case(),
-        method: params.method,
-        input: params.input,
-        unit: pair.rig.unit(),
-        points,
-        covariances,
-        along_epipolar_line,
-        traces: Traces::given(points1.to_vec(), points2.to_vec(), matched.reversed),
-        diagnostics,
-        explanation: Explanation::default(),
-    })
+    let adjusted = Adjusted { points, covariances, rig: &rig, matched: &matched, adjustment };
+    let mut found = adjusted.into_reconstruction(pair, params, (points1, points2))?;
+    found.diagnostics.closed = true;
+    found.diagnostics.trace_coverage = ring.coverage;
+    Ok(found)
 }
 
 fn without_repeat<V: View>(points: &[Pixel<V>]) -> &[Pixel<V>] {

@@ -1,3 +1,4 @@
+mod adjusted;
 mod closed;
 mod part;
 mod starts;
@@ -6,13 +7,14 @@ use accurate_fit::{FitError, PointFit, PointFitParams, fit_points};
 use accurate_geom::{Pixel, Rig, View, View1, View2};
 use accurate_match::{FreeMatch, FreeMatchParams, FreeMatcher, TangencyParams};
 
+use adjusted::Adjusted;
 pub(crate) use closed::{Ring, closed_points};
 use part::{End, MatchedPart};
 use starts::smoothed_pairs;
 
 use crate::diagnostics::Adjustment;
-use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled};
-use crate::{Closure, Diagnostics, Error, Explanation, Params, Reconstruction, Traces, ViewPair};
+use crate::sampled_curve::{SampledCurve, sampled};
+use crate::{Closure, Error, Params, Reconstruction, ViewPair};
 
 /// Our own method on ordered points: matched in the better direction with free ends and gaps, then
 /// one 3D spline adjusted to both views. Curves whose ends meet in both views are closed ones.
@@ -21,7 +23,6 @@ use crate::{Closure, Diagnostics, Error, Explanation, Params, Reconstruction, Tr
 /// the diagnostics say why.
 pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
     let case = || pair.id.clone();
-    let matching = |source| Error::Matching { case: case(), source };
     let fitting = |source| Error::Fitting { case: case(), source };
     let (points1, points2) = pair
         .points
@@ -57,22 +58,11 @@ pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Recons
         }
         Err(source) => return Err(fitting(source)),
     };
-    let along_epipolar_line = along_epipolar_lines(&points, &rig).map_err(matching)?;
-    let counts = [points1.len(), points2.len()];
-    let diagnostics =
-        Diagnostics::of_free_match(&matched, counts, &along_epipolar_line, adjustment);
-    Ok(Reconstruction {
-        id: case(),
-        method: params.method,
-        input: params.input,
-        unit: pair.rig.unit(),
-        points,
-        covariances,
-        along_epipolar_line,
-        traces: Traces::given(points1.clone(), points2.clone(), matched.reversed),
-        diagnostics,
-        explanation: Explanation::default(),
-    })
+    Adjusted { points, covariances, rig: &rig, matched: &matched, adjustment }.into_reconstruction(
+        pair,
+        params,
+        (points1, points2),
+    )
 }
 
 /// A match and the likeliest fit that starts from it.

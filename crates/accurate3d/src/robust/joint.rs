@@ -1,6 +1,6 @@
 use accurate_fit::{
     AdaptiveParams, CalibrationEstimate, CalibrationPriors, OutlineFit, OutlinePair,
-    fit_outlines_adaptively, fit_outlines_and_calibration,
+    fit_outlines_adaptively,
 };
 use accurate_geom::{Pixel, Rig, View1, View2};
 use accurate_match::ProposeParams;
@@ -8,8 +8,9 @@ use accurate_traverse::WalkParams;
 use ndarray::Array2;
 
 use super::candidates::ViewCandidates;
+use super::evidence::{Evidence, Walks};
 use super::score::Candidate;
-use super::search::Search;
+use super::search::{Effort, Search, Tried};
 use super::suspicion::{Suspicion, suspicions};
 use crate::{Error, Explanation};
 
@@ -48,6 +49,19 @@ pub struct RobustParams {
     /// How wrong the calibration of view 2 may be; `None`: it is exact. Else a shift of image 2 and a
     /// roll of its camera are unknowns, and the search is repeated with the rig so corrected.
     pub calibration: Option<CalibrationPriors>,
+    /// When the search goes on with more effort after the first choice.
+    pub second_look: SecondLook,
+}
+
+/// When the search goes on with more effort after the first choice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SecondLook {
+    /// The first choice is the last.
+    Never,
+    /// If there is reason to doubt the first choice.
+    InDoubt,
+    /// Always; several times slower.
+    Always,
 }
 
 impl RobustParams {
@@ -57,7 +71,7 @@ impl RobustParams {
         propose: ProposeParams::DEFAULT,
         max_fits: 24,
         min_fits: 2,
-        enough_fits: 6,
+        enough_fits: 12,
         clear_lead: 1.5,
         finalists: 6,
         repaired: 2,
@@ -67,6 +81,7 @@ impl RobustParams {
         walk_weight: 0.3,
         by_probability: false,
         calibration: None,
+        second_look: SecondLook::InDoubt,
     };
 }
 
@@ -87,6 +102,8 @@ pub(crate) struct JointResult {
     pub(crate) calibration: Option<CalibrationEstimate>,
     /// Reasons to doubt the result; none for most right ones.
     pub(crate) suspicions: Vec<Suspicion>,
+    /// What they rest on.
+    pub(crate) evidence: Evidence,
     /// What was considered and decided.
     pub(crate) explanation: Explanation,
 }
@@ -111,38 +128,33 @@ pub(crate) fn reconstruct_masks(
     let (outline1, outline2) = (view1.outline.clone(), view2.outline.clone());
     let outlines = OutlinePair::new(&outline1, &outline2)
         .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));
-    let mut choice = choose(&mut view1, &mut view2, &outlines, rig, params, case)?;
-    let mut calibration = None;
-    if let Some(priors) = &params.calibration {
-        let calibrated = |best: &Candidate| {
-            let (start, settings) = (&best.fit.curve, &best.settings);
-            let adaptive = AdaptiveParams::DEFAULT;
-            fit_outlines_and_calibration(start, &outlines, rig, settings, &adaptive, priors).ok()
-        };
-        let corrected =
-            calibrated(&choice.best).and_then(|first| first.calibration.correct(rig).ok());
-        if let Some(corrected) = corrected {
-            choice = choose(&mut view1, &mut view2, &outlines, &corrected, params, case)?;
-        }
-        if let Some(last) = calibrated(&choice.best) {
-            choice.best = choice.best.refitted(last.fit, rig);
-            calibration = Some(last.calibration);
-        }
-    } else {
-        let adaptive = AdaptiveParams::DEFAULT;
-        let best = &choice.best;
-        let fit =
-            fit_outlines_adaptively(&best.fit.curve, &outlines, rig, &best.settings, &adaptive);
-        if let Ok(fit) = fit {
-            choice.best = best.refitted(fit, rig);
-        }
+    let mut search = Search { outlines: &outlines, rig, params, case, effort: Effort::Quick };
+    let mut choice = choose(&search, &mut view1, &mut view2, None)?;
+    let corrected = params
+        .calibration
+        .and_then(|priors| search.calibrated(&choice.best, rig, &priors))
+        .and_then(|first| first.calibration.correct(rig).ok());
+    if let Some(corrected) = &corrected {
+        search.rig = corrected;
+        choice = choose(&search, &mut view1, &mut view2, None)?;
     }
-    let Choice { best, rivals, margin, fits } = choice;
+    let mut result = Settled::of(&search, choice, rig, &view1, &view2);
+    let again = match params.second_look {
+        SecondLook::Never => false,
+        SecondLook::InDoubt => !suspicions(&result.evidence).is_empty(),
+        SecondLook::Always => true,
+    };
+    if again {
+        search.effort = Effort::Thorough;
+        let choice = choose(&search, &mut view1, &mut view2, Some(result.choice))?;
+        result = Settled::of(&search, choice, rig, &view1, &view2);
+    }
+    let Settled { choice: Choice { best, rivals, margin, fits, .. }, fit, calibration, evidence } =
+        result;
     let [i, j] = best.walks;
     let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
-    let suspicions = suspicions(&best, margin, coverage, rig);
     let explanation = Explanation {
-        candidates: std::iter::once(&best).chain(&rivals).map(Candidate::considered).collect(),
+        candidates: std::iter::once(&fit).chain(&rivals).map(Candidate::considered).collect(),
         junctions: [view1.junctions(i), view2.junctions(j)],
     };
     Ok(JointResult {
@@ -154,9 +166,51 @@ pub(crate) fn reconstruct_masks(
         margin,
         fits,
         calibration,
-        suspicions,
-        fit: best.fit,
+        suspicions: suspicions(&evidence),
+        evidence,
+        fit: fit.fit,
     })
+}
+
+/// A choice with its last, adaptive fit.
+struct Settled {
+    choice: Choice,
+    /// The best with that fit, if there was one.
+    fit: Candidate,
+    calibration: Option<CalibrationEstimate>,
+    evidence: Evidence,
+}
+
+impl Settled {
+    /// `given_rig` is the one that the calibration's correction is relative to.
+    fn of(
+        search: &Search<'_>,
+        choice: Choice,
+        given_rig: &Rig,
+        view1: &ViewCandidates<View1>,
+        view2: &ViewCandidates<View2>,
+    ) -> Self {
+        let best = &choice.best;
+        let mut calibration = None;
+        let fit = match &search.params.calibration {
+            Some(priors) => search.calibrated(best, given_rig, priors).map(|last| {
+                calibration = Some(last.calibration);
+                last.fit
+            }),
+            None => {
+                let (start, settings) = (&best.fit.curve, &best.settings);
+                let adaptive = AdaptiveParams::DEFAULT;
+                fit_outlines_adaptively(start, search.outlines, given_rig, settings, &adaptive).ok()
+            }
+        };
+        let fit = fit.map_or_else(|| best.clone(), |fit| best.refitted(fit, given_rig));
+        let [i, j] = best.walks;
+        let mut walks = Walks::default();
+        walks.add(&view1.walks, i, view1.cut_ends(i).len() / 2);
+        walks.add(&view2.walks, j, view2.cut_ends(j).len() / 2);
+        let evidence = Evidence::new(&fit, &best.shape, choice.margin, &walks, given_rig);
+        Self { choice, fit, calibration, evidence }
+    }
 }
 
 struct Choice {
@@ -165,25 +219,33 @@ struct Choice {
     rivals: Vec<Candidate>,
     margin: f64,
     fits: usize,
+    tried: Vec<Tried>,
 }
 
-/// The search with one rig.
+/// The search with one rig and one effort, going on from an `earlier` one with less effort.
 fn choose(
+    search: &Search<'_>,
     view1: &mut ViewCandidates<View1>,
     view2: &mut ViewCandidates<View2>,
-    outlines: &OutlinePair<'_>,
-    rig: &Rig,
-    params: &RobustParams,
-    case: &str,
+    earlier: Option<Choice>,
 ) -> Result<Choice, Error> {
-    let search = Search { outlines, rig, params, case };
-    let mut found = Vec::new();
-    let pairs = search.propose_and_fit(view1, view2, [0, 0], params.max_fits, &mut found)?;
-    let mut fits = found.len();
+    let params = search.params;
+    let (mut found, mut tried, mut fits) = (Vec::new(), Vec::new(), 0);
+    if let Some(earlier) = earlier {
+        found.push(earlier.best);
+        found.extend(earlier.rivals);
+        (tried, fits) = (earlier.tried, earlier.fits);
+    }
+    let before = found.len();
+    let pairs =
+        search.propose_and_fit(view1, view2, [0, 0], params.max_fits, &mut tried, &mut found)?;
+    fits += found.len() - before;
     let mut finalists = search.finalists(found);
     let mut more = search.restarted(&finalists, view1, view2);
-    more.append(&mut finalists);
-    finalists = search.finalists(more);
+    if !more.is_empty() {
+        more.append(&mut finalists);
+        finalists = search.finalists(more);
+    }
     let is_good = |list: &[Candidate]| list.first().is_some_and(|best| best.is_good(params));
     if !is_good(&finalists) {
         if let Some(best) = finalists.first().cloned() {
@@ -205,14 +267,14 @@ fn choose(
     }
     let Some(best) = finalists.first().cloned() else {
         let walks = [view1.walks.len(), view2.walks.len()];
-        return Err(Error::NoCandidate { case: case.to_owned(), walks, pairs });
+        return Err(Error::NoCandidate { case: search.case.to_owned(), walks, pairs });
     };
     let margin = finalists
         .iter()
         .find(|rival| !rival.shape.is_like(&best.shape, RIVAL_PX))
         .map_or(f64::INFINITY, |rival| rival.score - best.score);
     let rivals = finalists.split_off(1);
-    Ok(Choice { best, rivals, margin, fits })
+    Ok(Choice { best, rivals, margin, fits, tried })
 }
 
 /// The bridges twice as wide as they come: what hides the body hides how it bends there.

@@ -2,6 +2,7 @@
 //! and the fit of one 3D spline to both outlines judges the pairs.
 
 mod candidates;
+mod evidence;
 mod joint;
 mod repair;
 mod score;
@@ -10,6 +11,7 @@ mod shape;
 mod start;
 mod suspicion;
 
-pub use joint::RobustParams;
+pub use evidence::Evidence;
 pub(crate) use joint::{JointResult, reconstruct_masks};
+pub use joint::{RobustParams, SecondLook};
 pub use suspicion::Suspicion;

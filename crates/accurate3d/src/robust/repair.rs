@@ -30,7 +30,7 @@ impl Search<'_> {
                 .min_by(|a, b| a.score.total_cmp(&b.score))
                 .filter(|next| next.score < best.score - GAIN);
             match next {
-                Some(next) => best = self.converged(&next),
+                Some(next) => best = self.converged(&next, f64::INFINITY),
                 None => break,
             }
         }
@@ -91,7 +91,7 @@ impl Search<'_> {
         // New walks of one view with all of the other.
         for from in [[before[0], 0], [0, before[1]]] {
             if from[0] < view1.walks.len() && from[1] < view2.walks.len() && from != [0, 0] {
-                self.propose_and_fit(view1, view2, from, max_fits, found)?;
+                self.propose_and_fit(view1, view2, from, max_fits, &mut Vec::new(), found)?;
             }
         }
         Ok(())

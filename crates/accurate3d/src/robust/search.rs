@@ -1,15 +1,21 @@
-use accurate_fit::{OutlineFit, OutlineFitParams, OutlinePair, fit_outlines};
+use accurate_fit::{
+    AdaptiveParams, CalibratedFit, CalibrationPriors, OutlineFit, OutlineFitParams, OutlinePair,
+    fit_outlines, fit_outlines_and_calibration,
+};
 use accurate_geom::{Curve3, EpipolarAngle, Pixel, Rig, View, View1, View2};
-use accurate_match::{FreeEnds, Proposal, propose_pairs};
+use accurate_match::{FreeEnds, Proposal, ProposeParams, propose_pairs};
 
 use super::RobustParams;
 use super::candidates::{ViewCandidates, free_ends};
 use super::score::{Candidate, Origin};
+use super::shape::Shape;
 use super::start::{OTHER_PRICES, PRICES, start_from};
 use crate::Error;
 
 /// Two curves that are nowhere farther apart than this are one, px.
 pub(crate) const SAME_PX: f64 = 2.0;
+/// A start no farther than this from a fitted curve would end there, px: within reach of the fit.
+const SAME_START_PX: f64 = 4.0;
 
 /// For a start that is a fit already: the last settings from the first step on.
 pub(crate) const SETTLED: OutlineFitParams = OutlineFitParams {
@@ -23,49 +29,102 @@ pub(crate) const SETTLED: OutlineFitParams = OutlineFitParams {
 pub(crate) const FINE: OutlineFitParams =
     OutlineFitParams { knot_spacing_px: 4.0, lambda3: 0.03, lambda3_start: 0.03, ..SETTLED };
 
+/// A margin beyond this is as good as any larger one.
+const CLEAR: f64 = 5.0;
+/// A score so much worse than a good one's is no rival's.
+const BEHIND: f64 = 10.0;
+
+/// Pairs kept at each sieve of the proposals where a good curve is likely among the first; see
+/// [`ProposeParams`].
+const QUICK_KEPT: [usize; 3] = [1000, 80, 50];
+
+/// A pair that was fitted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tried {
+    proposal: Proposal,
+    /// From every start.
+    wholly: bool,
+}
+
+/// A candidate, and whether it was fitted from every start.
+struct Judged {
+    candidate: Candidate,
+    wholly: bool,
+}
+
 /// Everything that stays the same while candidates come and go.
 pub(crate) struct Search<'a> {
     pub(crate) outlines: &'a OutlinePair<'a>,
     pub(crate) rig: &'a Rig,
     pub(crate) params: &'a RobustParams,
     pub(crate) case: &'a str,
+    pub(crate) effort: Effort,
+}
+
+/// How much is tried before a good curve is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Effort {
+    /// What is right for most.
+    Quick,
+    /// Every proposal, and every start of the best.
+    Thorough,
 }
 
 impl Search<'_> {
     /// Pairs the walks from the given numbers on, fits the pairs in the order of their promise, and
     /// stops early once a good one is there and the next are not worth a try. Returns the number of
-    /// pairs proposed and adds to `found`, unsorted.
+    /// pairs proposed and adds to `found`, unsorted, and to `tried`, whose pairs are not tried again.
     pub(crate) fn propose_and_fit(
         &self,
         view1: &ViewCandidates<View1>,
         view2: &ViewCandidates<View2>,
         from: [usize; 2],
         max_fits: usize,
+        tried: &mut Vec<Tried>,
         found: &mut Vec<Candidate>,
     ) -> Result<usize, Error> {
         let matching = |source| Error::Matching { case: self.case.to_owned(), source };
         let angles = EpipolarAngle::new(self.rig);
         let (signals1, signals2) = (view1.signals(from[0]), view2.signals(from[1]));
-        let proposals =
-            propose_pairs(&angles, &signals1, &signals2, &self.params.propose).map_err(matching)?;
-        let mut tried: Vec<Proposal> = Vec::new();
+        let params = &self.params.propose;
+        let params = match self.effort {
+            Effort::Quick => ProposeParams {
+                keep_screened: params.keep_screened.min(QUICK_KEPT[0]),
+                keep_coarse: params.keep_coarse.min(QUICK_KEPT[1]),
+                keep_fine: params.keep_fine.min(QUICK_KEPT[2]),
+                ..*params
+            },
+            Effort::Thorough => *params,
+        };
+        let proposals = propose_pairs(&angles, &signals1, &signals2, &params).map_err(matching)?;
+        let mut count = 0;
         for proposal in &proposals {
             let proposal =
                 Proposal { i: proposal.i + from[0], j: proposal.j + from[1], ..*proposal };
-            if tried.len() >= max_fits || self.settled(found, tried.len(), &proposal) {
+            if count >= max_fits || self.settled(found, count, &proposal) {
                 break;
             }
-            if tried.iter().any(|known| are_alike(known, &proposal, view1, view2)) {
+            let known = |known: &Tried| {
+                (known.wholly || self.effort == Effort::Quick)
+                    && are_alike(&known.proposal, &proposal, view1, view2)
+            };
+            if tried.iter().any(known) {
                 continue;
             }
-            tried.push(proposal);
-            found.extend(self.judged(&proposal, view1, view2));
+            count += 1;
+            let good = found.iter().filter(|c| c.good).map(|c| c.score).min_by(f64::total_cmp);
+            let judged = self.judged(&proposal, view1, view2, good);
+            tried.push(Tried { proposal, wholly: judged.as_ref().is_none_or(|j| j.wholly) });
+            found.extend(judged.map(|j| j.candidate));
         }
         Ok(proposals.len())
     }
 
     /// Whether a good fit is there and the next proposal is not worth a try.
     fn settled(&self, found: &[Candidate], tried: usize, next: &Proposal) -> bool {
+        if self.effort == Effort::Thorough {
+            return false;
+        }
         let best = found.iter().filter(|c| c.good).map(|c| c.proposal_score).min_by(f64::total_cmp);
         best.is_some_and(|best| {
             tried >= self.params.enough_fits
@@ -73,13 +132,15 @@ impl Search<'_> {
         })
     }
 
-    /// The better of a plain and, unless that is good already, an annealed fit.
+    /// The better of a plain and, unless that is good already, an annealed fit. Without much effort
+    /// what is far behind the best `good` score is left at that.
     fn judged(
         &self,
         proposal: &Proposal,
         view1: &ViewCandidates<View1>,
         view2: &ViewCandidates<View2>,
-    ) -> Option<Candidate> {
+        good: Option<f64>,
+    ) -> Option<Judged> {
         let (walk1, walk2) = (&view1.walks[proposal.i], &view2.walks[proposal.j]);
         let (start, mean_distance_px) = start_from(
             &PRICES,
@@ -101,11 +162,18 @@ impl Search<'_> {
         let plain = self.fit(&start, &OutlineFitParams::DEFAULT).map(judge);
         if let Some(mut plain) = plain.clone().filter(|c| c.is_good(self.params)) {
             plain.good = true;
-            return Some(plain);
+            return Some(Judged { candidate: plain, wholly: true });
+        }
+        let hopeless = |c: &Candidate| {
+            self.effort == Effort::Quick && good.is_some_and(|good| c.score > good + BEHIND)
+        };
+        if let Some(candidate) = plain.clone().filter(hopeless) {
+            return Some(Judged { candidate, wholly: false });
         }
         let annealed = self.fit(&start, &OutlineFitParams::ANNEALED).map(judge);
         let best = [plain, annealed].into_iter().flatten();
-        best.min_by(|a, b| a.score.total_cmp(&b.score)).map(|candidate| self.checked(candidate))
+        let best = best.min_by(|a, b| a.score.total_cmp(&b.score))?;
+        Some(Judged { candidate: self.checked(best), wholly: true })
     }
 
     /// Notes whether a candidate is good, perhaps with finer knots: a J tip bends more than the usual
@@ -128,7 +196,7 @@ impl Search<'_> {
     }
 
     /// The first walk pairs again, matched from corner to corner: some stretches along epipolar lines
-    /// come out otherwise.
+    /// come out otherwise. Without much effort only where that start is another one.
     pub(crate) fn restarted(
         &self,
         finalists: &[Candidate],
@@ -147,6 +215,11 @@ impl Search<'_> {
                 OutlineFitParams::DEFAULT.knot_spacing_px,
             );
             let Some((start, _)) = start else { continue };
+            if self.effort == Effort::Quick
+                && Shape::new(&start, self.rig).is_along(&candidate.shape, SAME_START_PX)
+            {
+                continue;
+            }
             for params in [OutlineFitParams::DEFAULT, OutlineFitParams::ANNEALED] {
                 if let Some(fit) = self.fit(&start, &params) {
                     more.push(candidate.refitted(fit, self.rig));
@@ -156,17 +229,37 @@ impl Search<'_> {
         more
     }
 
+    /// The adaptive fit with the calibration of view 2 among the unknowns.
+    pub(crate) fn calibrated(
+        &self,
+        candidate: &Candidate,
+        given_rig: &Rig,
+        priors: &CalibrationPriors,
+    ) -> Option<CalibratedFit> {
+        let (start, settings) = (&candidate.fit.curve, &candidate.settings);
+        let adaptive = AdaptiveParams::DEFAULT;
+        let found = fit_outlines_and_calibration(
+            start,
+            self.outlines,
+            given_rig,
+            settings,
+            &adaptive,
+            priors,
+        );
+        found.ok()
+    }
+
     pub(crate) fn fit(&self, start: &Curve3, params: &OutlineFitParams) -> Option<OutlineFit> {
         fit_outlines(start, self.outlines, self.rig, params).ok()
     }
 
     /// The fit carried on with its last settings until it rests; ranking before that picks wrong
-    /// loops.
-    pub(crate) fn converged(&self, candidate: &Candidate) -> Candidate {
+    /// loops. What cannot come near the score `to_beat` at its pace is left.
+    pub(crate) fn converged(&self, candidate: &Candidate, to_beat: f64) -> Candidate {
         const ROUNDS: usize = 4;
         const REST: f64 = 0.3;
         let mut best = candidate.clone();
-        for _ in 0..ROUNDS {
+        for round in 1..=ROUNDS {
             if best.fit.converged {
                 break;
             }
@@ -176,7 +269,9 @@ impl Search<'_> {
             if gain > 0.0 {
                 best = next;
             }
-            if gain < REST {
+            // Later rounds gain less than the ones before.
+            let hope = gain * (ROUNDS - round) as f64;
+            if gain < REST || best.score - hope > to_beat + CLEAR {
                 break;
             }
         }
@@ -186,7 +281,6 @@ impl Search<'_> {
     /// The best different curves, converged, best first. Beside a good one, those far behind are
     /// not carried on.
     pub(crate) fn finalists(&self, mut found: Vec<Candidate>) -> Vec<Candidate> {
-        const BEHIND: f64 = 10.0;
         let different = |mut list: Vec<Candidate>| {
             list.sort_by(|a, b| a.score.total_cmp(&b.score));
             let mut kept: Vec<Candidate> = Vec::new();
@@ -202,7 +296,14 @@ impl Search<'_> {
         if let Some(best) = found.first().filter(|best| best.good).map(|best| best.score) {
             found.retain(|candidate| candidate.score < best + BEHIND);
         }
-        different(found.iter().map(|candidate| self.converged(candidate)).collect())
+        let mut to_beat = f64::INFINITY;
+        let mut converged = Vec::with_capacity(found.len());
+        for candidate in &found {
+            let candidate = self.converged(candidate, to_beat);
+            to_beat = to_beat.min(candidate.score);
+            converged.push(candidate);
+        }
+        different(converged)
     }
 }
 

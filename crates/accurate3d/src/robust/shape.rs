@@ -20,6 +20,28 @@ impl Shape {
         Self { samples, px_per_unit }
     }
 
+    /// Largest distance of a sample from its partner, px.
+    pub(crate) fn distance_px(&self, other: &Self) -> f64 {
+        let distance = |(a, b): (&Point3, &Point3)| (a - b).norm();
+        let largest = self.samples.iter().zip(&other.samples).map(distance).fold(0.0, f64::max);
+        largest * self.px_per_unit
+    }
+
+    /// Whether no sample is farther than `px` from the other curve wherever that is; the ends may be
+    /// off by twice that.
+    pub(crate) fn is_along(&self, other: &Self, px: f64) -> bool {
+        let limit = px / self.px_per_unit;
+        let last = self.samples.len() - 1;
+        self.samples.iter().enumerate().all(|(k, p)| {
+            let allowed = if k == 0 || k == last { 2.0 * limit } else { limit };
+            other.samples.windows(2).any(|w| {
+                let e = w[1] - w[0];
+                let t = (p - w[0]).dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE);
+                (p - w[0] - e * t.clamp(0.0, 1.0)).norm() <= allowed
+            })
+        })
+    }
+
     /// Whether no sample is farther than `px` from its partner, in the same or the other direction.
     pub(crate) fn is_like(&self, other: &Self, px: f64) -> bool {
         let limit = px / self.px_per_unit;
@@ -110,6 +132,22 @@ mod tests {
     }
 
     #[test]
+    fn a_shorter_curve_runs_along_the_longer_one_but_is_not_like_it() {
+        let line = |from: f64, y: f64| {
+            let points: Vec<_> = (0..30)
+                .map(|k| Point3::new(from + (200.0 - from) * f64::from(k) / 29.0, y, 3.0))
+                .collect();
+            Shape::new(&Curve3::interpolate(&points).unwrap(), &rig())
+        };
+        let (whole, part, beside) = (line(0.0, 0.0), line(50.0, 0.0), line(0.0, 6.0));
+        assert!(part.is_along(&whole, 2.0));
+        assert!(!part.is_like(&whole, 2.0));
+        // The begin is 50 px away from the part's.
+        assert!(!whole.is_along(&part, 2.0));
+        assert!(!beside.is_along(&whole, 2.0));
+    }
+
+    #[test]
     fn a_curve_is_like_itself_reversed_and_unlike_one_that_is_moved() {
         let curve = |x: f64| {
             let points: Vec<_> = (0..30)
@@ -119,6 +157,10 @@ mod tests {
         };
         let rig = rig();
         let here = Shape::new(&curve(0.0), &rig);
+        assert_eq!(here.distance_px(&here), 0.0);
+        // 9 units at one px a unit, within the few percent by which its depth differs.
+        let moved = here.distance_px(&Shape::new(&curve(9.0), &rig));
+        assert!((moved - 9.0).abs() < 0.9, "{moved}");
         assert!(here.is_like(&Shape::new(&curve(0.0).reversed(), &rig), 0.1));
         assert!(!here.is_like(&Shape::new(&curve(9.0), &rig), 3.0));
     }

@@ -1,0 +1,168 @@
+use accurate_fit::OutlineFit;
+use accurate_geom::{Curve3, Rig, View};
+use accurate_traverse::Walk;
+use serde::Serialize;
+
+use super::score::Candidate;
+use super::shape::{Shape, px_per_unit};
+
+/// What bears on whether a chosen curve is the right one, all known without the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Evidence {
+    /// Outline that the curve does not explain, cut faces at bridges aside; 0 at the truth.
+    pub unexplained: f64,
+    /// Curve that the masks do not show; 0 at the truth.
+    pub outside: f64,
+    /// Mean squared residual of the boundary points, px²; 1/18 at the truth.
+    pub chi_per_point: f64,
+    /// The largest such mean over 50 px of the curve.
+    pub worst_chi_per_point: f64,
+    /// By how much the best curve that is another one (somewhere more than 5 px away) is worse; none
+    /// if there is no other.
+    pub margin: Option<f64>,
+    /// Mean Sampson distance of the walks that the curve started from, px.
+    pub walks_distance_px: f64,
+    /// Part of the less covered skeleton that its walk leaves out.
+    pub uncovered: f64,
+    /// By how much the walks are dearer than the cheapest of each view, in the unit of their cost.
+    pub walks_behind: f64,
+    /// Fraction of the walks' points where two strands lie on each other.
+    pub overlap: f64,
+    /// Bridges over gaps that the walks take.
+    pub bridges: usize,
+    /// Junctions where the walks could have gone on otherwise.
+    pub junctions: usize,
+    /// Largest standard deviation of the curve across its own direction, px; 0 if unknown.
+    pub sigma_px: f64,
+    /// Fraction of the curve that runs along epipolar lines (within 6 degrees).
+    pub along_epipolar_line: f64,
+    /// How far the last, adaptive fit moved the curve, px.
+    pub last_move_px: f64,
+    /// `∫ min(κ, 0.1 / px) |dθ|` of the curve, 1/px.
+    pub bending: f64,
+}
+
+impl Evidence {
+    /// Names of [`Evidence::terms`].
+    pub const TERMS: [&'static str; 15] = [
+        "unexplained",
+        "outside",
+        "chi per point",
+        "worst chi per point",
+        "margin",
+        "distance of the walks",
+        "uncovered",
+        "walks behind",
+        "overlap",
+        "bridges",
+        "junctions",
+        "sigma",
+        "along epipolar lines",
+        "last move",
+        "bending",
+    ];
+
+    /// The evidence on scales on which more is worse and nothing runs away: the terms of a linear
+    /// rule.
+    pub fn terms(&self) -> [f64; Self::TERMS.len()] {
+        let log = |value: f64, unit: f64| (value.max(0.0) / unit).ln_1p();
+        let chi = |value: f64| (18.0 * value.max(1e-3)).ln();
+        [
+            log(self.unexplained, 0.05),
+            log(self.outside, 0.05),
+            chi(self.chi_per_point),
+            chi(self.worst_chi_per_point),
+            self.margin.map_or(0.0, |margin| 1.0 / (1.0 + margin.max(0.0))),
+            log(self.walks_distance_px, 0.1),
+            log(self.uncovered, 0.02),
+            log(self.walks_behind, 0.5),
+            self.overlap,
+            log(self.bridges as f64, 1.0),
+            log(self.junctions as f64, 1.0),
+            log(self.sigma_px, 0.3),
+            self.along_epipolar_line,
+            log(self.last_move_px, 0.3),
+            log(self.bending, 0.05),
+        ]
+    }
+
+    pub(crate) fn new(
+        best: &Candidate,
+        before: &Shape,
+        margin: f64,
+        walks: &Walks,
+        rig: &Rig,
+    ) -> Self {
+        let judgement = &best.fit.judgement;
+        Self {
+            unexplained: best.misfit - judgement.outside,
+            outside: judgement.outside,
+            chi_per_point: judgement.chi_per_point(),
+            worst_chi_per_point: judgement.worst_chi_per_point,
+            margin: margin.is_finite().then_some(margin),
+            walks_distance_px: best.mean_distance_px,
+            uncovered: walks.uncovered,
+            walks_behind: walks.behind,
+            overlap: walks.overlap,
+            bridges: walks.bridges,
+            junctions: walks.junctions,
+            sigma_px: largest_sigma_px(&best.fit, rig),
+            along_epipolar_line: along_epipolar_line(&best.fit.curve, rig),
+            last_move_px: before.distance_px(&best.shape),
+            bending: super::shape::bending(&best.fit.curve, rig),
+        }
+    }
+}
+
+/// What the two chosen walks say.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Walks {
+    uncovered: f64,
+    behind: f64,
+    overlap: f64,
+    bridges: usize,
+    junctions: usize,
+}
+
+impl Walks {
+    /// Takes in the walk of one view, out of all of that view.
+    pub(crate) fn add<V: View>(&mut self, all: &[Walk<V>], chosen: usize, bridges: usize) {
+        let walk = &all[chosen];
+        let cheapest = all.iter().map(|w| w.cost.total()).fold(f64::INFINITY, f64::min);
+        self.uncovered = self.uncovered.max(1.0 - walk.coverage);
+        self.behind += walk.cost.total() - cheapest;
+        let reused = walk.flags.iter().filter(|flag| flag.reused).count();
+        self.overlap += 0.5 * reused as f64 / walk.flags.len().max(1) as f64;
+        self.bridges += bridges;
+        let open = |d: &&accurate_traverse::Decision<V>| {
+            d.alternatives.iter().any(|(_, price)| price.is_finite())
+        };
+        self.junctions += walk.decisions.iter().filter(open).count();
+    }
+}
+
+const SAMPLES: usize = 200;
+
+/// The largest standard deviation of the curve across its own direction, px; 0 if unknown.
+fn largest_sigma_px(fit: &OutlineFit, rig: &Rig) -> f64 {
+    let Some(covariance) = &fit.covariance else { return 0.0 };
+    let curve = &fit.curve;
+    let variance = curve
+        .uniform_parameters(SAMPLES)
+        .into_iter()
+        .map(|t| covariance.across(curve, t).1.symmetric_eigenvalues().max())
+        .fold(0.0, f64::max);
+    variance.sqrt() * px_per_unit(&curve.sample(16), rig)
+}
+
+/// A curve runs along the epipolar lines of both views where its tangent lies in the epipolar plane.
+fn along_epipolar_line(curve: &Curve3, rig: &Rig) -> f64 {
+    const SINE: f64 = 0.1;
+    let (c1, c2) = (rig.camera1().centre(), rig.camera2().centre());
+    let along = |t: &f64| {
+        let normal = (c2 - c1).cross(&(curve.at(*t) - c1));
+        let tangent = curve.derivative(*t);
+        normal.dot(&tangent).abs() < SINE * normal.norm() * tangent.norm()
+    };
+    curve.uniform_parameters(SAMPLES).iter().filter(|t| along(t)).count() as f64 / SAMPLES as f64
+}
