@@ -173,7 +173,8 @@ impl Code {
             Self::NoMatch => {
                 "No monotone pairing of the two curves makes sense under this calibration: usually \
                  the views are swapped, the extrinsics are inverted (camera to world instead of \
-                 world to camera), or the pixels are not undistorted."
+                 world to camera), or the pixels are not undistorted. `accurate camera doctor` tries \
+                 these and more, and names the one."
             }
             Self::NoFit => {
                 "A spline was fitted to both views and did not come out as a curve: too few points \
@@ -186,7 +187,8 @@ impl Code {
             Self::Calibration => {
                 "K must be 3x3, upper triangular, with a non-zero diagonal (signs are free). RT is \
                  3x4 [R | t], world to camera: x_cam = R X + t, with R a rotation. Two cameras must \
-                 not share their centre."
+                 not share their centre. `accurate camera show` prints what a file was taken for, \
+                 docs/cameras.md says what each tool's file has to hold."
             }
             Self::SizeMismatch => {
                 "Masks and images must have the size that the cameras were calibrated for, and both \

@@ -84,6 +84,10 @@ impl fmt::Display for Failure {
     }
 }
 
+/// For views that do not go together.
+const ASK_THE_DOCTOR: &str = "`accurate camera doctor` tries the usual mistakes (swapped views, inverse extrinsics, mirrored \
+     images, units, lenses) and names the one";
+
 impl From<IoError> for Failure {
     fn from(error: IoError) -> Self {
         let (code, hint) = match &error {
@@ -96,7 +100,10 @@ impl From<IoError> for Failure {
             IoError::System { .. } => (Self::IO, None),
             IoError::Geometry { .. } => (
                 Code::Calibration,
-                Some("K is 3x3 upper triangular; RT is 3x4 [R | t], world to camera"),
+                Some(
+                    "K is 3x3 upper triangular; [R | t] is world to camera; docs/cameras.md says what \
+                     each tool's file is taken for",
+                ),
             ),
             IoError::SizeMismatch { .. } => (
                 Code::SizeMismatch,
@@ -108,6 +115,10 @@ impl From<IoError> for Failure {
             | IoError::NotANumber { .. }
             | IoError::Malformed { .. } => (Code::Malformed, None),
             IoError::NotFinite { .. } => (Code::NotFinite, None),
+            IoError::Unsupported { what, .. } if what.contains("image size") => (
+                Code::Unsupported,
+                Some("state it: --image-size WIDTHxHEIGHT, e.g. --image-size 512x512"),
+            ),
             IoError::Unsupported { .. } | IoError::UnknownExtension { .. } => {
                 (Code::Unsupported, None)
             }
@@ -138,12 +149,12 @@ impl From<Error> for Failure {
             }
             Error::Traversal { .. } => Self::new(Code::NoOrder, message)
                 .with_hint("order the points yourself and use --input points"),
-            Error::Matching { .. } => Self::new(Code::NoMatch, message)
-                .with_hint("check that the calibration belongs to these views, in this order"),
+            Error::Matching { .. } => Self::new(Code::NoMatch, message).with_hint(ASK_THE_DOCTOR),
             Error::NotClosed { .. } => Self::new(Code::NoOrder, message)
                 .with_hint("leave --closed out for a body with two ends"),
-            Error::NoCandidate { .. } => Self::new(Code::NoMatch, message)
-                .with_hint("check that the calibration belongs to these views, in this order"),
+            Error::NoCandidate { .. } => {
+                Self::new(Code::NoMatch, message).with_hint(ASK_THE_DOCTOR)
+            }
             Error::Fitting { .. } => Self::new(Code::NoFit, message),
             Error::Name(_) => Self::new(Self::BAD_INPUT, message),
             Error::Synthesis(_) => Self::new(Self::USAGE, message),

@@ -13,8 +13,10 @@ mod config;
 mod console;
 mod dicom_child;
 mod failure;
+mod raster;
 mod segmentation;
 mod text;
+mod two_views;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -44,10 +46,8 @@ fn main() -> ExitCode {
 
 fn run(words: Vec<std::ffi::OsString>) -> Result<(), Failure> {
     // Before anything else takes memory: this process may be the limited reader of one file.
-    if words.get(1).is_some_and(|word| word == dicom_child::WORD)
-        && let Some(path) = words.get(3)
-    {
-        return dicom_child::child(std::path::Path::new(path));
+    if words.get(1).is_some_and(|word| word == dicom_child::WORD) {
+        return dicom_child::child(&words);
     }
     // What a config file says stands before what the user says, and the last word wins.
     let command = Cli::command().args_override_self(true);

@@ -1,7 +1,8 @@
 //! The files of `accurate`: pair folders, cameras, images and curves, read with care and written
 //! whole or not at all.
 //!
-//! - [`read_pair`], [`write_pair`], [`find_pairs`]: the pair folder, the native input.
+//! - [`read_pair`], [`write_pair`], [`find_pairs`]: the pair folder, the native input;
+//!   [`pair_of_views`]: the same from two cameras and two files.
 //! - [`read_rig`], [`write_rig`]: two cameras in one TOML or JSON file.
 //! - [`read_curve`], [`write_curve`]: 3D curves as CSV, PLY, VTK PolyData, Slicer Markups,
 //!   NPY, NPZ or (feature `parquet`) Parquet.
@@ -41,6 +42,7 @@ mod nifti_label;
 mod npy;
 mod npz;
 mod pair;
+mod pair_of_views;
 mod pair_write;
 #[cfg(feature = "parquet")]
 mod parquet_file;
@@ -71,6 +73,7 @@ pub use matrix::{read_matrix3, read_matrix3x4, write_matrix3, write_matrix3x4};
 pub use nifti_label::write_mask_nifti;
 pub use npy::write_npy_u8;
 pub use pair::{OrderedPoints, Pair, PairParts, Truth, read_pair};
+pub use pair_of_views::{ViewFiles, pair_of_views};
 pub use pair_write::{PairContents, write_pair};
 pub use ply::{PlyEncoding, read_ply_points, write_ply_points};
 pub use points::{read_points, write_points};

@@ -199,7 +199,7 @@ fn sizes_from_images(
     Err(IoError::Missing { path: meta_path.to_owned(), also_tried })
 }
 
-fn check_size(
+pub(crate) fn check_size(
     path: &Path,
     (height, width): (usize, usize),
     other: &Path,

@@ -199,3 +199,86 @@ fn simulators_of_radiographs_are_read() {
     let error = read_cameras(&[path], &ViewDefaults::default()).unwrap_err();
     assert!(matches!(error, IoError::Field { .. }), "{error}");
 }
+
+/// An NPY file, version 1.0, of little-endian `f8`.
+fn npy(shape: &str, fortran: bool, values: &[f64]) -> Vec<u8> {
+    let order = if fortran { "True" } else { "False" };
+    let mut head = format!("{{'descr': '<f8', 'fortran_order': {order}, 'shape': {shape}, }}");
+    while (10 + head.len() + 1) % 64 != 0 {
+        head.push(' ');
+    }
+    head.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((head.len() as u16).to_le_bytes());
+    bytes.extend(head.as_bytes());
+    bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    bytes
+}
+
+/// P of two cameras, f = 1000 px and 1200 px, the second turned by a right angle about y.
+const MATRICES: [f64; 24] = [
+    1000.0, 0.0, 250.0, 5000.0, 0.0, 1000.0, 250.0, 6000.0, 0.0, 0.0, 1.0, 700.0, //
+    -240.0, 0.0, 1200.0, 7000.0, -240.0, 1200.0, 0.0, 8000.0, -1.0, 0.0, 0.0, 900.0,
+];
+
+#[test]
+fn matrices_in_npy_and_csv_are_the_same_cameras() {
+    let folder = tempfile::tempdir().unwrap();
+    let defaults =
+        ViewDefaults { image_size: Some(ImageSize { width: 500, height: 500 }), unit: MM.unit };
+    let read = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        read_cameras(&[path], &defaults)
+    };
+    let rows = |gap: &str| -> Vec<u8> {
+        let row = |r: &[f64]| r.iter().map(f64::to_string).collect::<Vec<_>>().join(gap);
+        MATRICES.chunks_exact(4).map(row).collect::<Vec<_>>().join("\n").into_bytes()
+    };
+    let array = read("p.npy", &npy("(2, 3, 4)", false, &MATRICES)).unwrap();
+    assert_eq!(array.len(), 2);
+    for (index, view) in array.iter().enumerate() {
+        let p = view.camera.projection_matrix();
+        for (at, expected) in MATRICES[12 * index..][..12].iter().enumerate() {
+            // RQ and the product again, of entries up to 8000.
+            assert!((p[(at / 4, at % 4)] - expected).abs() < 1e-9, "{index} {at}");
+        }
+    }
+    assert_eq!(array[0].camera.k()[(0, 0)], 1000.0);
+    assert_eq!(array[0].unit, LengthUnit::Millimetre);
+    for (name, gap) in [("p.csv", ","), ("q.csv", "; "), ("p.txt", "  ")] {
+        let text = read(name, &rows(gap)).unwrap();
+        let cameras =
+            |views: &[NamedView]| views.iter().map(|v| v.camera.clone()).collect::<Vec<_>>();
+        assert_eq!(cameras(&text), cameras(&array), "{name}");
+    }
+    let one = read("one.npy", &npy("(3, 4)", false, &MATRICES[..12])).unwrap();
+    assert_eq!(one[0].camera, array[0].camera);
+}
+
+#[test]
+fn arrays_that_are_no_matrices_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let defaults =
+        ViewDefaults { image_size: Some(ImageSize { width: 500, height: 500 }), unit: MM.unit };
+    let mut nan = MATRICES;
+    nan[5] = f64::NAN;
+    let mut flat = MATRICES;
+    flat[8..12].fill(0.0);
+    let whole = npy("(2, 3, 4)", false, &MATRICES);
+    let cases: [(&str, Vec<u8>, &str); 7] = [
+        ("a.npy", npy("(4, 3, 2)", false, &MATRICES), "expected (3, 4) or (n, 3, 4)"),
+        ("a.npy", npy("(2, 3, 4)", true, &MATRICES), "C order"),
+        ("a.npy", npy("(2, 3, 4)", false, &nan), "not finite"),
+        ("a.npy", npy("(2, 3, 4)", false, &flat), "camera"),
+        ("a.npy", whole[..whole.len() - 8].to_vec(), "NPY"),
+        ("a.csv", b"1,0,0,0\n0,1,0,0\n0,0,1,0\n1,2\n".to_vec(), "a row of 2 numbers"),
+        ("a.csv", b"1,0,0,0\n0,1,0,0\n0,0,1,0\n1,0,0,0\n".to_vec(), "multiple of 3"),
+    ];
+    for (name, bytes, expected) in cases {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let error = read_cameras(&[path], &defaults).unwrap_err().to_string();
+        assert!(error.contains(expected), "{name}: {error}");
+    }
+}

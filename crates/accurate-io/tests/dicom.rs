@@ -115,6 +115,23 @@ fn a_flip_mirrors_and_a_turn_turns() {
 }
 
 #[test]
+fn a_field_of_view_that_is_cut_out_of_the_detector_is_noted() {
+    let notes = |origin: Option<&[u8]>| {
+        let mut elements = view_elements();
+        if let Some(origin) = origin {
+            elements.insert(6, ((0x18, 0x7030), *b"DS", origin.to_vec()));
+        }
+        let (_folder, path) = saved(&bytes_of(&elements));
+        read_dicom_view(&path).unwrap().notes.join("\n")
+    };
+    assert!(notes(Some(b"12\\40")).contains("row 12, column 40 of the detector"));
+    for origin in [None, Some(&b"0\\0"[..])] {
+        let notes = notes(origin);
+        assert!(!notes.contains("FieldOfViewOrigin") && notes.contains("middle of the image"));
+    }
+}
+
+#[test]
 fn hostile_files_are_refused_by_the_scan() {
     // A value of a gigabyte in a file of a few hundred bytes.
     let mut bomb = file(&[]);

@@ -18,8 +18,10 @@ pub use accurate_seg as seg;
 pub use accurate_synth as synth;
 pub use accurate_traverse as traverse;
 
+mod c_arm;
 mod diagnostics;
 mod direction;
+pub mod doctor;
 mod error;
 mod explanation;
 mod figure;
@@ -27,6 +29,7 @@ mod method;
 mod ordered_points;
 mod pair;
 mod picture;
+pub mod plan;
 mod reconstruct;
 mod reconstruction;
 mod report;

@@ -1,43 +1,22 @@
-use std::path::PathBuf;
+use accurate3d::io::{CameraFormat, NamedView, ViewDefaults, write_cameras};
 
-use accurate3d::io::{
-    CameraFormat, NamedView, ViewDefaults, is_dicom, read_cameras, write_cameras,
-};
-
+use super::doctor;
 use crate::args::{CameraArgs, CameraCommand, CameraTarget, ConvertArgs};
 use crate::console::Console;
-use crate::dicom_child;
 use crate::failure::Failure;
+use crate::two_views::cameras_of;
 
 /// `accurate camera`: what camera files say, in one convention, and in another tool's.
 pub fn run(command: &CameraCommand, console: &Console) -> Result<(), Failure> {
     match command {
         CameraCommand::Show(args) => show(args, console),
         CameraCommand::Convert(args) => convert(args, console),
+        CameraCommand::Doctor(args) => doctor::run(args, console),
     }
 }
 
-/// The cameras of files of any kind; DICOM is read by a process of its own.
-pub fn views(args: &CameraArgs) -> Result<Vec<NamedView>, Failure> {
-    let defaults = ViewDefaults { image_size: args.image_size, unit: args.unit };
-    let mut views = Vec::new();
-    let mut others: Vec<PathBuf> = Vec::new();
-    // Neighbours that are not DICOM go together: a stereo calibration may fill two files.
-    for path in &args.files {
-        if is_dicom(path)? {
-            if !others.is_empty() {
-                views.extend(read_cameras(&others, &defaults)?);
-                others.clear();
-            }
-            views.push(dicom_child::read_view(path)?);
-        } else {
-            others.push(path.clone());
-        }
-    }
-    if !others.is_empty() {
-        views.extend(read_cameras(&others, &defaults)?);
-    }
-    Ok(views)
+fn views(args: &CameraArgs) -> Result<Vec<NamedView>, Failure> {
+    cameras_of(&args.files, &ViewDefaults { image_size: args.image_size, unit: args.unit })
 }
 
 fn show(args: &CameraArgs, console: &Console) -> Result<(), Failure> {

@@ -3,7 +3,7 @@ use accurate3d::synth::{CaseOptions, Family, generate};
 use accurate3d::{InputKind, Method, NOT_FOR_CLINICAL_USE, Params, ViewPair, reconstruct};
 
 use super::outputs::Outputs;
-use super::reconstruct::{result_json, summary};
+use super::reconstruct::{hashed, result_json, summary};
 use super::synth::contents_of;
 use crate::args::{DemoArgs, Extra, PointsKind};
 use crate::console::Console;
@@ -24,7 +24,13 @@ pub fn run(args: &DemoArgs, console: &Console) -> Result<(), Failure> {
     let pair = ViewPair::from(read_pair(&dir, parts)?);
     let params = Params::new(InputKind::Mask, Method::default());
     let reconstruction = reconstruct(&pair, &params)?;
-    let result = result_json(&dir, parts, &pair, &params, &reconstruction)?;
+    let result = result_json(
+        &dir.display().to_string(),
+        hashed(&dir, parts)?,
+        &pair,
+        &params,
+        &reconstruction,
+    )?;
     let outputs = Outputs {
         folder: Some(args.out.clone()),
         extras: vec![Extra::Ply, Extra::Vtp, Extra::MrkJson, Extra::Picture, Extra::Report],

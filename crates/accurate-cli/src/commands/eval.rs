@@ -1,11 +1,17 @@
+use std::path::Path;
+
 use accurate3d::eval::{self, curve_scores, reprojection_rms};
-use accurate3d::geom::Point3;
-use accurate3d::io::{PairParts, Truth, read_curve, read_pair};
+use accurate3d::geom::{Point2, Point3, Polyline3, View1};
+use accurate3d::io::{
+    PairParts, Truth, ViewDefaults, read_curve, read_mask, read_pair, read_points,
+};
+use accurate3d::seg::{Mask, Skeleton, zhang_suen};
 use serde_json::{Value, json};
 
 use crate::args::EvalArgs;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::two_views::cameras_of;
 
 /// `accurate eval`: the paper's scores and the point-to-polyline ones, as JSON.
 pub fn run(args: &EvalArgs, console: &Console) -> Result<(), Failure> {
@@ -31,7 +37,57 @@ pub fn run(args: &EvalArgs, console: &Console) -> Result<(), Failure> {
         let rms = reprojection_rms(&curve.points, &truth.points, &pair.rig, spacing)?;
         scores["reprojection_rms_px"] = json!([rms.view1_px, rms.view2_px]);
     }
+    if let (Some(camera), Some(seen)) = (&args.third, &args.seen) {
+        scores["third_view"] = third_view(&curve.points, camera, seen, spacing)?;
+    }
     console.json(&scores)
+}
+
+/// How far the image of a curve lies from what a view shows that took no part, px.
+fn third_view(
+    curve: &[Point3],
+    camera: &Path,
+    seen: &Path,
+    spacing: f64,
+) -> Result<Value, Failure> {
+    let views = cameras_of(&[camera.to_owned()], &ViewDefaults::default())?;
+    let [view] = views.as_slice() else {
+        let message = format!("{}: {} views; expected one", camera.display(), views.len());
+        return Err(Failure::new(Failure::USAGE, message));
+    };
+    let is_csv = seen.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
+    let shown: Vec<Point2> = if is_csv {
+        let points = read_points::<View1>(seen)?;
+        points
+            .iter()
+            .map(|p| view.camera.undistort(&p.point()))
+            .collect::<Result<_, _>>()
+            .map_err(|e| Failure::new(Failure::BAD_INPUT, format!("{}: {e}", seen.display())))?
+    } else {
+        let skeleton = Skeleton::of(&zhang_suen(&Mask::from_array(read_mask(seen)?)?))?;
+        skeleton.pixels_as::<View1>().iter().map(|p| p.point()).collect()
+    };
+    let line = Polyline3::new(curve.to_vec())
+        .and_then(|line| line.resample(spacing))
+        .map_err(|e| Failure::new(Failure::BAD_INPUT, e.to_string()))?;
+    let mut distances = Vec::with_capacity(line.points().len());
+    for x in line.points() {
+        let p = view.camera.project(x).map_err(|e| {
+            Failure::new(Failure::BAD_INPUT, format!("{}: {e}", camera.display()))
+                .with_hint("is this camera in the world of the curve?")
+        })?;
+        let nearest = shown.iter().map(|q| (q - p).norm()).min_by(f64::total_cmp);
+        distances.extend(nearest);
+    }
+    distances.sort_unstable_by(f64::total_cmp);
+    let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+    let at = |share: f64| distances[(share * (distances.len() - 1) as f64).round() as usize];
+    Ok(json!({
+        "camera": camera.display().to_string(),
+        "mean_px": mean,
+        "median_px": at(0.5),
+        "percentile_95_px": at(0.95),
+    }))
 }
 
 /// The paper's four scores.

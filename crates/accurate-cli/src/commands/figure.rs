@@ -6,20 +6,21 @@ use serde_json::json;
 use crate::args::FigureArgs;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::write_text;
+use crate::raster::{is_picture, write_picture};
 
 /// Cases of the comparing figures, one a column.
 const COLUMNS: u64 = 3;
+/// Pixels of a PNG per unit of the figure: 840 for each panel, for print.
+const PNG_SCALE: f32 = 2.0;
 
-/// `accurate figure`: one SVG file.
+/// `accurate figure`: one picture, SVG or PNG.
 pub fn run(args: &FigureArgs, console: &Console) -> Result<(), Failure> {
-    if args.out.extension().is_none_or(|e| !e.eq_ignore_ascii_case("svg")) {
-        let message = format!("figures are written as .svg, not as {}", args.out.display());
-        return Err(Failure::new(Failure::USAGE, message)
-            .with_hint("a browser or rsvg-convert makes a PNG of it"));
+    if !is_picture(&args.out) {
+        let message = format!("figures are written as .svg or .png, not as {}", args.out.display());
+        return Err(Failure::new(Failure::USAGE, message));
     }
     let cases = if args.pairs.is_empty() { generated(args.kind)? } else { given(args)? };
-    write_text(&args.out, &figure_svg(args.kind, &cases)?)?;
+    write_picture(&args.out, &figure_svg(args.kind, &cases)?, PNG_SCALE)?;
     let ids: Vec<&str> = cases.iter().map(|case| case.id.as_str()).collect();
     if console.json {
         let out = args.out.display().to_string();

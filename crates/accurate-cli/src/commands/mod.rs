@@ -1,10 +1,12 @@
 mod camera;
 mod demo;
+mod doctor;
 mod eval;
 mod explain;
 mod figure;
 mod model;
 mod outputs;
+mod plan;
 mod reconstruct;
 mod reproduce;
 mod segment;
@@ -47,6 +49,7 @@ pub fn run(cli: &Cli, config: &str) -> Result<(), Failure> {
         Command::Reproduce(args) => reproduce::run(args, &console),
         Command::Verify(args) => verify::run(args, &console),
         Command::Camera(command) => camera::run(command, &console),
+        Command::PlanViews(args) => plan::run(args, &console),
         Command::Explain(args) => explain::run(args, &console),
         Command::Completions { shell } => shell::completions(*shell, &console),
         Command::Man => shell::manual(&console),

@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use crate::args::{Extra, ReconstructArgs};
 use crate::failure::Failure;
+use crate::raster::write_picture;
 use crate::text::{make_folder, write_text};
 
 /// Where the results of a command go: at most one folder, and single files.
@@ -40,7 +41,7 @@ impl Outputs {
                 );
                 return Err(Failure::new(Failure::USAGE, message).with_hint(
                     "one folder, and files ending in .csv, .ply, .vtp, .mrk.json, .npy, .npz, \
-                     .parquet, .svg, .html or .json",
+                     .parquet, .svg, .png, .html or .json",
                 ));
             } else {
                 outputs.folder = Some(path.clone());
@@ -109,7 +110,7 @@ fn kind_of(path: &Path) -> Option<Kind> {
         return Some(Kind::Curve);
     }
     match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
-        "svg" => Some(Kind::Picture),
+        "svg" | "png" => Some(Kind::Picture),
         "html" | "htm" => Some(Kind::Report),
         "json" => Some(Kind::Result),
         _ => None,
@@ -123,7 +124,7 @@ fn write_one(
     result: &Value,
 ) -> Result<(), Failure> {
     match kind_of(path) {
-        Some(Kind::Picture) => write_text(path, &picture_svg(pair, reconstruction)),
+        Some(Kind::Picture) => write_picture(path, &picture_svg(pair, reconstruction), 1.0),
         Some(Kind::Report) => {
             let scores = Some(&result["scores"]).filter(|scores| !scores.is_null());
             let html = report_html(pair, reconstruction, scores, &provenance(result))?;

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use accurate3d::fit::CalibrationPriors;
-use accurate3d::io::{PairParts, Truth, find_pairs, hash_pair, read_pair};
+use accurate3d::io::{PairParts, Truth, find_pairs, hash_file, hash_pair, read_pair};
 use accurate3d::seg::network::NetworkSegmenter;
 use accurate3d::seg::{Segmenter, unwatched};
 use accurate3d::{
@@ -17,6 +17,14 @@ use crate::args::ReconstructArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::segmentation::segmenter;
+use crate::two_views::{are_files, pair_of_files};
+
+/// What one run reads.
+enum Source {
+    Folder(PathBuf),
+    /// Two views given as files.
+    Files,
+}
 
 /// `accurate reconstruct`: every pair on its own; one that fails does not stop the others.
 pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
@@ -28,8 +36,8 @@ pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
     let bar = console.progress(jobs.len(), "reconstructing");
     let results: Vec<Result<Done, Failure>> = jobs
         .par_iter()
-        .map(|(dir, out)| {
-            let result = one(dir, out, args, segmenter.as_ref());
+        .map(|(source, out)| {
+            let result = one(source, out, args, segmenter.as_ref());
             bar.inc(1);
             result
         })
@@ -80,17 +88,33 @@ struct Done {
     suspect: Option<String>,
 }
 
-/// Pair folders with the places each result goes to.
-fn jobs(args: &ReconstructArgs) -> Result<Vec<(PathBuf, Outputs)>, Failure> {
+/// What is read, with the places each result goes to.
+fn jobs(args: &ReconstructArgs) -> Result<Vec<(Source, Outputs)>, Failure> {
     let outputs = Outputs::of(args)?;
+    if are_files(args) {
+        return Ok(vec![(Source::Files, outputs)]);
+    }
+    for (given, option) in [
+        (args.truth.is_some(), "--truth"),
+        (!args.frame.is_empty(), "--frame"),
+        (!args.views.views.is_empty(), "--views"),
+        (args.views.image_size.is_some(), "--image-size"),
+        (args.views.unit.is_some(), "--unit"),
+    ] {
+        if given {
+            let message = format!("{option} is for two views given as files");
+            return Err(Failure::new(Failure::USAGE, message)
+                .with_hint("a pair folder says this itself: docs/conventions.md"));
+        }
+    }
     let mut pairs = Vec::new();
-    for path in &args.pairs {
+    for path in &args.inputs {
         pairs.extend(find_pairs(path)?);
     }
     if let [only] = pairs.as_slice()
-        && args.pairs.first() == Some(only)
+        && args.inputs.first() == Some(only)
     {
-        return Ok(vec![(only.clone(), outputs)]);
+        return Ok(vec![(Source::Folder(only.clone()), outputs)]);
     }
     if let Some(file) = outputs.files.first() {
         let message =
@@ -116,17 +140,32 @@ fn jobs(args: &ReconstructArgs) -> Result<Vec<(PathBuf, Outputs)>, Failure> {
             )
             .with_hint("run them with different --out folders"));
         }
-        jobs.push((pair, outputs.in_folder(out)));
+        jobs.push((Source::Folder(pair), outputs.in_folder(out)));
     }
     Ok(jobs)
 }
 
-fn one(
-    dir: &Path,
-    out: &Outputs,
-    args: &ReconstructArgs,
-    segmenter: Option<&NetworkSegmenter>,
-) -> Result<Done, Failure> {
+/// A pair as read, what to call its place, and the files behind it with their hashes.
+struct Read {
+    pair: ViewPair,
+    shown: String,
+    inputs: Vec<Value>,
+}
+
+fn read(source: &Source, args: &ReconstructArgs, has_report: bool) -> Result<Read, Failure> {
+    let dir = match source {
+        Source::Folder(dir) => dir,
+        Source::Files => {
+            let (pair, files) = pair_of_files(args)?;
+            let mut inputs = Vec::new();
+            for file in files.iter().filter(|file| file.is_file()) {
+                let hash = hash_file(file)?;
+                inputs.push(json!({"file": file.display().to_string(), "blake3": hash}));
+            }
+            let names: Vec<String> = args.inputs.iter().map(|p| p.display().to_string()).collect();
+            return Ok(Read { pair: pair.into(), shown: names.join(", "), inputs });
+        }
+    };
     let parts = PairParts {
         points: args.input == InputKind::Points,
         masks: args.input == InputKind::Mask,
@@ -134,12 +173,31 @@ fn one(
         truth: Truth::IfPresent,
     };
     // A report also shows what the method does not read.
-    let shown = PairParts {
-        masks: parts.masks || (out.has_report() && dir.join("masks").is_dir()),
-        images: parts.images || (out.has_report() && dir.join("images").is_dir()),
+    let more = PairParts {
+        masks: parts.masks || (has_report && dir.join("masks").is_dir()),
+        images: parts.images || (has_report && dir.join("images").is_dir()),
         ..parts
     };
-    let pair = ViewPair::from(read_pair(dir, shown)?);
+    let pair = ViewPair::from(read_pair(dir, more)?);
+    Ok(Read { pair, shown: dir.display().to_string(), inputs: hashed(dir, parts)? })
+}
+
+/// The files that a pair folder's parts lie in, with their hashes.
+pub fn hashed(dir: &Path, parts: PairParts) -> Result<Vec<Value>, Failure> {
+    let describe = |(file, hash): (PathBuf, String)| {
+        let file = file.strip_prefix(dir).unwrap_or(&file).display().to_string();
+        json!({"file": file, "blake3": hash})
+    };
+    Ok(hash_pair(dir, parts)?.into_iter().map(describe).collect())
+}
+
+fn one(
+    source: &Source,
+    out: &Outputs,
+    args: &ReconstructArgs,
+    segmenter: Option<&NetworkSegmenter>,
+) -> Result<Done, Failure> {
+    let Read { pair, shown, inputs } = read(source, args, out.has_report())?;
     let pair = match segmenter {
         Some(segmenter) => segment_images(pair, segmenter, &unwatched)?,
         None => pair,
@@ -148,7 +206,7 @@ fn one(
     params.robust.calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
     params.closure = args.closed;
     let reconstruction = reconstruct(&pair, &params)?;
-    let mut result = result_json(dir, parts, &pair, &params, &reconstruction)?;
+    let mut result = result_json(&shown, inputs, &pair, &params, &reconstruction)?;
     if let Some(segmenter) = segmenter {
         result["parameters"]["segmentation"] = Value::from(segmenter.describe());
     }
@@ -163,8 +221,8 @@ fn one(
 
 /// What `result.json` says.
 pub fn result_json(
-    dir: &Path,
-    parts: PairParts,
+    shown: &str,
+    inputs: Vec<Value>,
     pair: &ViewPair,
     params: &Params,
     reconstruction: &Reconstruction,
@@ -179,16 +237,9 @@ pub fn result_json(
         .map(|(stage, text)| (stage.to_owned(), Value::from(text)))
         .collect::<serde_json::Map<_, _>>()
         .into();
-    let inputs: Vec<Value> = hash_pair(dir, parts)?
-        .into_iter()
-        .map(|(file, hash)| {
-            let file = file.strip_prefix(dir).unwrap_or(&file).display().to_string();
-            json!({"file": file, "blake3": hash})
-        })
-        .collect();
     Ok(json!({
         "case": reconstruction.id,
-        "pair": dir.display().to_string(),
+        "pair": shown,
         "method": reconstruction.method.name(),
         "input": reconstruction.input.name(),
         "unit": reconstruction.unit.label(),

@@ -164,7 +164,18 @@ pub fn read_dicom_view(path: &Path) -> Result<NamedView, IoError> {
         )),
         None => notes.push("no patient position".into()),
     }
-    notes.push("principal point taken at the middle of the image".into());
+    let corner = |index| {
+        let (tag, name) = (tags::FIELD_OF_VIEW_ORIGIN, "FieldOfViewOrigin");
+        number(path, &object, tag, name, index)
+    };
+    notes.push(match (corner(0)?, corner(1).ok().flatten()) {
+        (Some(row), Some(column)) if row != 0.0 || column != 0.0 => format!(
+            "principal point taken at the middle of the image, but the field of view begins at row \
+             {row}, column {column} of the detector (FieldOfViewOrigin): where it is not cut evenly \
+             about the central ray, the principal point is elsewhere"
+        ),
+        _ => "principal point taken at the middle of the image".into(),
+    });
 
     RawView {
         name: stem(path),

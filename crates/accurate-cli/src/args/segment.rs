@@ -1,0 +1,114 @@
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+/// Which network segments, and what runs it.
+#[derive(Debug, Args)]
+pub struct ModelArgs {
+    /// The segmentation model (default: the built-in one).
+    #[arg(long, value_name = "FILE.accmodel")]
+    pub model: Option<PathBuf>,
+    /// What runs the network: `auto` takes ONNX Runtime where its library is named, else rten.
+    #[arg(long, value_enum, default_value_t = EngineChoice::Auto)]
+    pub engine: EngineChoice,
+    /// Library of ONNX Runtime, libonnxruntime.so.* (default: the variable ORT_DYLIB_PATH).
+    #[arg(long, value_name = "LIBRARY")]
+    pub onnxruntime: Option<PathBuf>,
+    /// Let the network see the mirrored images as well: steadier, up to four times the time.
+    #[arg(long)]
+    pub mirror: bool,
+}
+
+/// What runs a network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EngineChoice {
+    /// ONNX Runtime where its library is named, else rten.
+    Auto,
+    /// Pure Rust, built in.
+    Rten,
+    /// ONNX Runtime, from its library.
+    Ort,
+}
+
+/// Meaning of an image's values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Photometric {
+    /// The body is darker than its surroundings.
+    Monochrome2,
+    /// The stored values are inverted: the body is brighter.
+    Monochrome1,
+}
+
+#[derive(Debug, Args)]
+pub struct SegmentArgs {
+    /// Grey images of 8 or 16 bits: PNG, JPEG, TIFF, PNM, BMP.
+    #[arg(required = true, value_name = "IMAGE")]
+    pub images: Vec<PathBuf>,
+    /// Folder for NAME_mask.png, NAME_probability.png (16 bits) and NAME_overlay.png.
+    #[arg(short, long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Probability above which a pixel begins the body, 0 to 1 (default: the model's own). Weaker
+    /// pixels down to 0.6 of it are taken where they hang together with such a one.
+    #[arg(long, value_name = "P")]
+    pub threshold: Option<f32>,
+    /// Whether the body is dark or bright in the stored values.
+    #[arg(long, value_enum, default_value_t = Photometric::Monochrome2)]
+    pub photometric: Photometric,
+    #[command(flatten)]
+    pub model: ModelArgs,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum ModelCommand {
+    /// Describe a model: name, network, pre- and post-processing, card.
+    Info {
+        /// The model (default: the built-in one).
+        model: Option<PathBuf>,
+    },
+    /// Check a model from its hash to its weights, and run it once with every engine that is there.
+    Verify {
+        /// The model (default: the built-in one).
+        model: Option<PathBuf>,
+        /// Library of ONNX Runtime (default: the variable ORT_DYLIB_PATH).
+        #[arg(long, value_name = "LIBRARY")]
+        onnxruntime: Option<PathBuf>,
+    },
+    /// Make a model of a folder of nnU-Net v2's results and its network exported to ONNX.
+    Import(ImportArgs),
+    /// Make a model of a network and its description.
+    Pack {
+        /// The network, ONNX with its weights inside.
+        network: PathBuf,
+        /// The description, JSON: what `accurate --json model info` prints as `manifest`.
+        #[arg(long, value_name = "FILE.json")]
+        manifest: PathBuf,
+        /// The model to write.
+        #[arg(short, long, value_name = "FILE.accmodel")]
+        out: PathBuf,
+    },
+}
+
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// Folder with plans.json and dataset.json.
+    pub folder: PathBuf,
+    /// The exported network; it must give logits (default: the folder's only .onnx file).
+    #[arg(long, value_name = "FILE.onnx")]
+    pub network: Option<PathBuf>,
+    /// The model to write.
+    #[arg(short, long, value_name = "FILE.accmodel")]
+    pub out: PathBuf,
+    /// Name of the model (default: that of the file).
+    #[arg(long)]
+    pub name: Option<String>,
+    /// Configuration of the plans that was trained.
+    #[arg(long, default_value = "2d")]
+    pub configuration: String,
+    /// Labels that are the body (default: all but the background).
+    #[arg(long, value_delimiter = ',', value_name = "LABELS")]
+    pub foreground: Vec<String>,
+    /// Axes that training mirrored along, 0 rows and 1 columns; empty for none. The plans do not
+    /// say; nnU-Net's own trainer takes both.
+    #[arg(long, value_delimiter = ',', default_value = "0,1", value_name = "AXES")]
+    pub mirror_axes: Vec<u8>,
+}

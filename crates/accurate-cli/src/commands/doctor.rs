@@ -1,0 +1,295 @@
+use std::path::{Path, PathBuf};
+
+use accurate3d::NOT_FOR_CLINICAL_USE;
+use accurate3d::doctor::{
+    CANNOT_BE_TOLD, Diagnosis, DoctorError, Finding, Seen, Verdict, diagnose,
+};
+use accurate3d::geom::{Camera, LengthUnit, Point2, Rig, View1};
+use accurate3d::io::{
+    NamedView, PairParts, Truth, find_pairs, read_mask, read_pair, read_points, write_rig,
+};
+use accurate3d::seg::{Mask, Skeleton, zhang_suen};
+use accurate3d::traverse::{TraverseParams, trace_single};
+use serde_json::{Value, json};
+
+use crate::args::{DoctorArgs, ViewArgs};
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::two_views::two_cameras;
+
+/// `accurate camera doctor`: what is wrong with two cameras, by what was seen with them.
+pub fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
+    let (views, seen) = examined(args)?;
+    let unit = common_unit(&views)?;
+    let cameras = [views[0].camera.clone(), views[1].camera.clone()];
+    let Some(seen) = seen else {
+        console.data(&described(&views))?;
+        console.remark(
+            "nothing was seen with them: give --matched, --points or --masks to have the mistakes tried",
+        );
+        return Ok(());
+    };
+    let diagnosis = diagnose(&cameras, unit, &seen)?;
+    if let Some(path) = &args.out {
+        let [one, two] = &diagnosis.mended;
+        let rig = Rig::new(one.clone(), two.clone(), unit)
+            .map_err(|e| Failure::new(Failure::BAD_INPUT, format!("the mended rig: {e}")))?;
+        write_rig(path, &rig)?;
+    }
+    if console.json {
+        console.json(&as_json(&views, &diagnosis))?;
+    } else {
+        console.data(&described(&views))?;
+        console.data(&as_text(&diagnosis, &seen))?;
+        if let Some(path) = &args.out {
+            console.remark(&format!("the mended cameras: {}", path.display()));
+        }
+    }
+    if args.strict && (diagnosis.verdict != Verdict::Sound || !diagnosis.remarks.is_empty()) {
+        return Err(Failure::new(Failure::SUSPECT, "the cameras are not sound"));
+    }
+    Ok(())
+}
+
+/// The two cameras, and what was seen with them.
+fn examined(args: &DoctorArgs) -> Result<([NamedView; 2], Option<Seen>), Failure> {
+    let usage = |what: &str| Failure::new(Failure::USAGE, what);
+    let kinds = [&args.matched, &args.points, &args.masks];
+    if kinds.iter().filter(|files| !files.is_empty()).count() > 1 {
+        return Err(usage("--matched, --points and --masks are three kinds of the same: give one"));
+    }
+    let named = !kinds.iter().all(|files| files.is_empty());
+    let folders = args.files.iter().all(|f| f.is_dir() && !f.join("cameras.txt").is_file());
+    if folders {
+        let (views, seen) = of_pair_folders(&args.files)?;
+        return Ok((views, if named { of_files(args)? } else { seen }));
+    }
+    let views = ViewArgs {
+        cameras: Vec::new(),
+        views: args.views.clone(),
+        image_size: args.image_size,
+        unit: args.unit,
+    };
+    Ok((two_cameras(&views, &args.files)?, of_files(args)?))
+}
+
+/// What the options name.
+fn of_files(args: &DoctorArgs) -> Result<Option<Seen>, Failure> {
+    if !args.matched.is_empty() {
+        let mut pairs = Vec::new();
+        for files in args.matched.chunks_exact(2) {
+            let [one, two] = [points_of(&files[0])?, points_of(&files[1])?];
+            if one.len() != two.len() {
+                let message = format!(
+                    "{} has {} points, {} has {}",
+                    files[0].display(),
+                    one.len(),
+                    files[1].display(),
+                    two.len()
+                );
+                return Err(Failure::new(Failure::BAD_INPUT, message).with_hint(
+                    "matched points have as many rows; ordered points that are not matched go in with --points",
+                ));
+            }
+            pairs.extend(one.into_iter().zip(two).map(|(a, b)| [a, b]));
+        }
+        return Ok(Some(Seen::Matched(pairs)));
+    }
+    let mut curves = Vec::new();
+    for files in args.points.chunks_exact(2) {
+        curves.push([points_of(&files[0])?, points_of(&files[1])?]);
+    }
+    for files in args.masks.chunks_exact(2) {
+        curves.push([traced(&files[0])?, traced(&files[1])?]);
+    }
+    Ok((!curves.is_empty()).then_some(Seen::Curves(curves)))
+}
+
+/// Pair folders that share their cameras, and their points, or their masks where there are none.
+fn of_pair_folders(folders: &[PathBuf]) -> Result<([NamedView; 2], Option<Seen>), Failure> {
+    let mut shared: Option<(PathBuf, Rig)> = None;
+    let mut curves = Vec::new();
+    for folder in folders {
+        for dir in find_pairs(folder)? {
+            let present = PairParts::present_in(&dir);
+            let parts = PairParts {
+                points: present.points,
+                masks: present.masks && !present.points,
+                images: false,
+                truth: Truth::Ignore,
+            };
+            let pair = read_pair(&dir, parts)?;
+            match &shared {
+                Some((other, rig)) if *rig != pair.rig => {
+                    let message =
+                        format!("{} and {} have other cameras", other.display(), dir.display());
+                    return Err(Failure::new(Failure::USAGE, message)
+                        .with_hint("examine pairs with different cameras one by one"));
+                }
+                Some(_) => {}
+                None => shared = Some((dir.clone(), pair.rig.clone())),
+            }
+            if let Some((one, two)) = &pair.points {
+                let plain1 = one.iter().map(|p| p.point()).collect();
+                curves.push([plain1, two.iter().map(|p| p.point()).collect()]);
+            } else if let Some(masks) = pair.masks {
+                let [one, two] = masks;
+                curves.push([traced_mask(one)?, traced_mask(two)?]);
+            }
+        }
+    }
+    let Some((dir, rig)) = shared else {
+        return Err(Failure::new(Failure::USAGE, "no pair folder is named"));
+    };
+    let view = |camera: &Camera, number: u8| NamedView {
+        name: format!("{}_{number}", dir.file_name().unwrap_or_default().to_string_lossy()),
+        camera: camera.clone(),
+        unit: rig.unit(),
+        frame: "as in the folder".into(),
+        notes: Vec::new(),
+    };
+    let views = [view(rig.camera1(), 1), view(rig.camera2(), 2)];
+    Ok((views, (!curves.is_empty()).then_some(Seen::Curves(curves))))
+}
+
+fn points_of(path: &Path) -> Result<Vec<Point2>, Failure> {
+    // The view is of no account here: the doctor may exchange them.
+    Ok(read_points::<View1>(path)?.iter().map(|p| p.point()).collect())
+}
+
+fn traced(path: &Path) -> Result<Vec<Point2>, Failure> {
+    traced_mask(read_mask(path)?).map_err(|failure| failure.of_file(path))
+}
+
+fn traced_mask(mask: ndarray::Array2<bool>) -> Result<Vec<Point2>, Failure> {
+    let skeleton = Skeleton::of(&zhang_suen(&Mask::from_array(mask)?))?;
+    let trace = trace_single(&skeleton.pixels_as::<View1>(), &TraverseParams::PAPER)?;
+    Ok(trace.points.iter().map(|p| p.point()).collect())
+}
+
+fn common_unit(views: &[NamedView; 2]) -> Result<LengthUnit, Failure> {
+    let [one, two] = [views[0].unit, views[1].unit];
+    if one == two {
+        return Ok(one);
+    }
+    let message = format!("camera 1 is in {one}, camera 2 in {two}");
+    Err(Failure::new(Failure::BAD_INPUT, message).with_hint("convert one, or state --unit"))
+}
+
+/// How the two cameras stand to each other.
+fn described(views: &[NamedView; 2]) -> String {
+    let [one, two] = [&views[0].camera, &views[1].camera];
+    let axis = |camera: &Camera| camera.r().row(2).transpose();
+    let (d1, d2) = (axis(one), axis(two));
+    let apart = d1.dot(&d2).clamp(-1.0, 1.0).acos().to_degrees();
+    let baseline = two.centre() - one.centre();
+    let normal = d1.cross(&d2);
+    // Parallel axes are everywhere as far apart as the baseline is across them.
+    let between = if normal.norm() > 1e-6 {
+        baseline.dot(&normal.normalize()).abs()
+    } else {
+        baseline.cross(&d1).norm()
+    };
+    format!(
+        "view 1 `{0}`, view 2 `{1}`: {apart:.1} degrees apart, centres {2:.2} {3} from each other, \
+         central rays pass at {between:.3} {3}",
+        views[0].name,
+        views[1].name,
+        baseline.norm(),
+        views[0].unit,
+    )
+}
+
+fn as_text(diagnosis: &Diagnosis, seen: &Seen) -> String {
+    let what = match seen {
+        Seen::Matched(pairs) => format!("{} matched points", pairs.len()),
+        Seen::Curves(curves) => format!("{} pairs of curves", curves.len()),
+    };
+    let residual = match (diagnosis.residual_px, seen) {
+        (None, _) => "no rig as given".to_owned(),
+        (Some(px), Seen::Matched(_)) => format!("epipolar residual {px:.2} px"),
+        (Some(px), Seen::Curves(_)) => format!("cost of the match {px:.2} px a point"),
+    };
+    let mut text =
+        format!("{what}: {residual}, {:.0} % in front of both", 100.0 * diagnosis.in_front);
+    for finding in &diagnosis.findings {
+        text.push_str(&format!(
+            "\n!! {} in {}: {:.2} -> {:.2} px if undone\n   fix: {}",
+            finding.mistake.name(),
+            views_of(finding),
+            finding.before_px,
+            finding.after_px,
+            finding.mistake.remedy(finding.which)
+        ));
+        for (mistake, which) in &finding.or {
+            text.push_str(&format!(
+                "\n   or {} in {which} (these views cannot tell): {}",
+                mistake.name(),
+                mistake.remedy(*which)
+            ));
+        }
+    }
+    for remark in &diagnosis.remarks {
+        text.push_str(&format!("\n?? {remark}"));
+    }
+    text.push_str(match diagnosis.verdict {
+        Verdict::Sound => "\nok: none of the usual mistakes makes it fit better",
+        Verdict::Mistaken => "\nok: nothing is left once that is undone",
+        Verdict::Unexplained => {
+            "\n!! it does not fit, and none of the usual mistakes explains it: other views, a table \
+             or patient that moved, wrong points, or a calibration that is plainly off"
+        }
+    });
+    text.push_str("\ncannot be told by any two views:");
+    for what in CANNOT_BE_TOLD {
+        text.push_str(&format!("\n   {what}"));
+    }
+    text
+}
+
+fn views_of(finding: &Finding) -> String {
+    match finding.mistake {
+        accurate3d::doctor::Mistake::ViewsSwapped => "the pair".to_owned(),
+        _ => finding.which.to_string(),
+    }
+}
+
+fn as_json(views: &[NamedView; 2], diagnosis: &Diagnosis) -> Value {
+    let finding = |f: &Finding| {
+        json!({
+            "mistake": f.mistake.name(),
+            "where": views_of(f),
+            "before_px": finite(f.before_px),
+            "after_px": f.after_px,
+            "fix": f.mistake.remedy(f.which),
+            "or": f.or.iter().map(|(m, w)| json!({
+                "mistake": m.name(), "where": w.to_string(), "fix": m.remedy(*w),
+            })).collect::<Vec<_>>(),
+        })
+    };
+    json!({
+        "views": [views[0].name, views[1].name],
+        "verdict": match diagnosis.verdict {
+            Verdict::Sound => "sound",
+            Verdict::Mistaken => "mistaken",
+            Verdict::Unexplained => "unexplained",
+        },
+        "residual_px": diagnosis.residual_px,
+        "in_front": diagnosis.in_front,
+        "points": diagnosis.points,
+        "findings": diagnosis.findings.iter().map(finding).collect::<Vec<_>>(),
+        "remarks": diagnosis.remarks.iter().map(|r| r.to_string()).collect::<Vec<_>>(),
+        "cannot_be_told": CANNOT_BE_TOLD,
+        "note": NOT_FOR_CLINICAL_USE,
+    })
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+impl From<DoctorError> for Failure {
+    fn from(error: DoctorError) -> Self {
+        Self::new(Self::BAD_INPUT, error.to_string())
+    }
+}

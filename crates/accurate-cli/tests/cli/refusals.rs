@@ -1,0 +1,166 @@
+//! Input that cannot be used is refused: exit code, words, and no output.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+use crate::program::{accurate, copy_of, failure, samples};
+
+/// Spoils a pair and expects an exit code, words in the message, and no output.
+fn refuses(input: &str, spoil: impl FnOnce(&Path), code: i32, words: &[&str]) {
+    let dir = TempDir::new().unwrap();
+    let pair = copy_of("bend", dir.path());
+    spoil(&pair);
+    let out = dir.path().join("out");
+    let (found, message) = failure(
+        accurate()
+            .args(["reconstruct", "--input", input, "--method", "paper", "--out"])
+            .arg(&out)
+            .arg(&pair),
+    );
+    assert_eq!(found, code, "{message}");
+    for word in words {
+        assert!(message.contains(word), "no `{word}` in: {message}");
+    }
+    let left: Vec<_> =
+        fs::read_dir(&out).map(|d| d.map(|e| e.unwrap().path()).collect()).unwrap_or_default();
+    assert!(left.is_empty(), "left behind: {left:?}");
+}
+
+fn write(path: PathBuf, text: &str) {
+    fs::write(path, text).unwrap();
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    refuses(
+        "mask",
+        |p| fs::remove_file(p.join("masks/mask_R.png")).unwrap(),
+        66,
+        &["mask_R.png", "hint"],
+    );
+    refuses(
+        "points",
+        |p| fs::remove_file(p.join("points/points_L.csv")).unwrap(),
+        66,
+        &["points_L.csv"],
+    );
+    refuses(
+        "mask",
+        |p| fs::remove_file(p.join("calibration/RT_L.txt")).unwrap(),
+        66,
+        &["RT_L.txt"],
+    );
+}
+
+#[test]
+fn a_matrix_of_the_wrong_shape_is_named() {
+    refuses("mask", |p| write(p.join("calibration/K_L.txt"), "1 0\n0 1\n"), 65, &["K_L.txt", "3"]);
+}
+
+#[test]
+fn nan_is_refused_with_its_place() {
+    refuses(
+        "mask",
+        |p| write(p.join("calibration/RT_R.txt"), "1 0 0 0\n0 NaN 0 0\n0 0 1 5\n"),
+        65,
+        &["RT_R.txt", "not finite"],
+    );
+    refuses(
+        "points",
+        |p| write(p.join("points/points_R.csv"), "x,y\n1,2\n3,inf\n"),
+        65,
+        &["points_R.csv"],
+    );
+}
+
+#[test]
+fn a_zero_baseline_is_refused() {
+    refuses(
+        "mask",
+        |p| {
+            for file in ["K", "RT"] {
+                let from = p.join(format!("calibration/{file}_L.txt"));
+                fs::copy(from, p.join(format!("calibration/{file}_R.txt"))).unwrap();
+            }
+        },
+        65,
+        &["zero baseline"],
+    );
+}
+
+#[test]
+fn a_matrix_that_is_no_rotation_is_refused() {
+    refuses(
+        "mask",
+        |p| write(p.join("calibration/RT_R.txt"), "1 0 0 0\n0 1.1 0 0\n0 0 1 5\n"),
+        65,
+        &["RT_R.txt", "not a rotation"],
+    );
+}
+
+fn mask_of(pair: &Path, view: &str, size: (usize, usize), on: &[(usize, usize)]) {
+    let mask = ndarray::Array2::from_shape_fn(size, |at| on.contains(&at));
+    accurate3d::io::write_mask(&pair.join(format!("masks/mask_{view}.png")), &mask).unwrap();
+}
+
+#[test]
+fn empty_and_one_pixel_masks_are_refused() {
+    refuses("mask", |p| mask_of(p, "L", (512, 512), &[]), 65, &["mask_L.png", "foreground"]);
+    refuses("mask", |p| mask_of(p, "R", (512, 512), &[(9, 9)]), 3, &["view 2", "1 "]);
+}
+
+#[test]
+fn a_closed_loop_is_refused() {
+    let ring: Vec<(usize, usize)> = (0..400)
+        .map(|k| {
+            let (s, c) = (f64::from(k) * 0.02).sin_cos();
+            ((256.0 + 40.0 * s).round() as usize, (256.0 + 40.0 * c).round() as usize)
+        })
+        .collect();
+    refuses("mask", |p| mask_of(p, "L", (512, 512), &ring), 3, &["view 1", "endpoint"]);
+}
+
+#[test]
+fn an_image_of_another_size_is_refused() {
+    refuses(
+        "mask",
+        |p| mask_of(p, "L", (100, 90), &[(5, 5), (5, 6)]),
+        65,
+        &["mask_L.png", "90", "512"],
+    );
+}
+
+#[test]
+fn one_bad_pair_does_not_stop_the_others() {
+    let dir = TempDir::new().unwrap();
+    let bad = copy_of("bend", dir.path());
+    fs::remove_file(bad.join("masks/mask_L.png")).unwrap();
+    let out = dir.path().join("out");
+    let assert = accurate()
+        .args(["reconstruct", "-i", "mask", "-m", "paper", "-o"])
+        .arg(&out)
+        .arg(&bad)
+        .arg(samples().join("wire"))
+        .assert()
+        .failure();
+    let output = assert.get_output();
+    assert_eq!(output.status.code(), Some(66));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("1 of 2 pairs failed"));
+    assert!(out.join("wire/curve.csv").is_file());
+    assert!(!out.join("bend").exists());
+}
+
+#[test]
+fn wrong_usage_has_its_own_exit_code() {
+    for args in [
+        &["reconstruct", "x", "--input", "smell", "--out", "y"][..],
+        &["table", "--set", "no-such-set"],
+        &["table", "--cases", "0"],
+        &["demo", "--threads", "100000"],
+        &["synth", "spaghetti", "--out", "y"],
+    ] {
+        assert_eq!(failure(accurate().args(args)).0, 2, "{args:?}");
+    }
+}

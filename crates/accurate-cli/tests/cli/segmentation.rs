@@ -1,0 +1,245 @@
+//! Images and models as a user gives them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::program::{accurate, copy_of, failure, samples, stdout};
+
+/// A model that takes what is darker than the mean by a standard deviation for the body.
+fn dark_model(dir: &Path) -> PathBuf {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../accurate-seg/tests/fixtures");
+    let model = dir.join("dark.accmodel");
+    accurate()
+        .args(["model", "pack"])
+        .arg(fixtures.join("dark.onnx"))
+        .arg("--manifest")
+        .arg(fixtures.join("dark.json"))
+        .arg("-o")
+        .arg(&model)
+        .assert()
+        .success();
+    model
+}
+
+/// A pair whose images show its masks, dark on bright.
+fn pair_of_shadows(name: &str, dir: &Path) -> PathBuf {
+    let pair = copy_of(name, dir);
+    fs::create_dir_all(pair.join("images")).unwrap();
+    for view in ["L", "R"] {
+        let mask = accurate3d::io::read_mask(&pair.join(format!("masks/mask_{view}.png"))).unwrap();
+        let image = mask.mapv(|body| if body { 30_u8 } else { 200 });
+        accurate3d::io::write_u8(&pair.join(format!("images/view_{view}.png")), &image).unwrap();
+    }
+    fs::remove_dir_all(pair.join("masks")).unwrap();
+    pair
+}
+
+#[cfg(not(feature = "embedded-model"))]
+#[test]
+fn images_say_that_no_network_is_installed() {
+    let dir = TempDir::new().unwrap();
+    let pair = pair_of_shadows("bend", dir.path());
+    let out = dir.path().join("out");
+    let (code, message) =
+        failure(accurate().args(["reconstruct", "-i", "image", "-o"]).arg(out).arg(&pair));
+    assert_eq!(code, 69);
+    assert!(message.contains("no segmentation network is installed"), "{message}");
+}
+
+#[cfg(feature = "embedded-model")]
+#[test]
+fn images_need_no_set_up() {
+    let dir = TempDir::new().unwrap();
+    let info: Value =
+        serde_json::from_str(&stdout(accurate().args(["--json", "model", "info"]))).unwrap();
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/wire.accmodel");
+    let mut of_file = accurate();
+    of_file.args(["--json", "model", "info"]).arg(shipped);
+    assert_eq!(info, serde_json::from_str::<Value>(&stdout(&mut of_file)).unwrap());
+
+    let set = dir.path().join("set");
+    let mut synth = accurate();
+    synth.args(["synth", "easy", "--seed", "1000", "--count", "1", "--xray", "--out"]).arg(&set);
+    synth.assert().success();
+    let pair = fs::read_dir(&set).unwrap().map(|e| e.unwrap().path()).find(|p| p.is_dir()).unwrap();
+    let out = dir.path().join("out");
+    let mut run = accurate();
+    run.env_remove("ORT_DYLIB_PATH");
+    run.args(["--json", "reconstruct", "-i", "image", "-o"]).arg(&out).arg(&pair);
+    let result: Value = serde_json::from_str(&stdout(&mut run)).unwrap();
+    let by = result["parameters"]["segmentation"].as_str().unwrap();
+    assert!(by.contains(&info["blake3"].as_str().unwrap()[..12]) && by.contains("rten"), "{by}");
+    assert!(result["scores"]["overall"].is_number() && out.join("curve.csv").is_file());
+
+    let mut segment = accurate();
+    segment.env_remove("ORT_DYLIB_PATH");
+    segment.args(["segment", "-o"]).arg(&out).arg(pair.join("images/view_L.png"));
+    segment.assert().success();
+    assert!(out.join("view_L_mask.png").is_file());
+}
+
+#[test]
+fn images_are_segmented_and_reconstructed() {
+    let dir = TempDir::new().unwrap();
+    let model = dark_model(dir.path());
+    let pair = pair_of_shadows("bend", dir.path());
+    for method in ["accurate", "paper"] {
+        let out = dir.path().join(method);
+        let mut command = accurate();
+        command.args(["--json", "reconstruct", "-i", "image", "-m", method, "--model"]).arg(&model);
+        let text = stdout(command.arg("-o").arg(&out).arg(&pair));
+        let result: Value = serde_json::from_str(&text).unwrap();
+        // The mask is the sample's own, so that the curve is that of the mask.
+        let mut command = accurate();
+        command.args(["--json", "reconstruct", "-i", "mask", "-m", method, "-o"]);
+        let text = stdout(command.arg(dir.path().join("mask")).arg(samples().join("bend")));
+        let of_mask: Value = serde_json::from_str(&text).unwrap();
+        assert!(of_mask["scores"]["overall"].is_number());
+        assert_eq!(result["scores"], of_mask["scores"], "{method}");
+        let by = result["parameters"]["segmentation"].as_str().unwrap();
+        assert!(by.contains("dark pixels") && by.contains("rten"), "{by}");
+        assert_eq!(result["input"], "image");
+    }
+}
+
+#[test]
+fn segment_writes_mask_probability_and_overlay() {
+    let dir = TempDir::new().unwrap();
+    let model = dark_model(dir.path());
+    let pair = pair_of_shadows("bend", dir.path());
+    let image = pair.join("images/view_L.png");
+    let out = dir.path().join("out");
+    let mut command = accurate();
+    command.args(["--json", "segment", "--model"]).arg(&model).arg("-o").arg(&out).arg(&image);
+    let report: Value = serde_json::from_str(&stdout(&mut command)).unwrap();
+    let mask = accurate3d::io::read_mask(&out.join("view_L_mask.png")).unwrap();
+    let truth = accurate3d::io::read_mask(&samples().join("bend/masks/mask_L.png")).unwrap();
+    assert_eq!(mask, truth);
+    assert_eq!(report["body_px"], mask.iter().filter(|b| **b).count());
+    let probability = accurate3d::io::read_grey(&out.join("view_L_probability.png")).unwrap();
+    assert_eq!(probability.depth, accurate3d::io::BitDepth::Sixteen);
+    assert!(mask.iter().zip(&probability.values).all(|(body, p)| !body || *p > 0.3 * 65_535.0));
+    assert!(out.join("view_L_overlay.png").is_file());
+
+    let (code, message) = failure(
+        accurate().arg("segment").arg("--model").arg(&model).arg("-o").arg(&out).args([&image; 2]),
+    );
+    assert_eq!(code, 2);
+    assert!(message.contains("view_L_mask.png"), "{message}");
+    let mut bad = accurate();
+    bad.args(["segment", "--threshold", "1.5", "--model"]).arg(&model);
+    assert_eq!(failure(bad.arg("-o").arg(&out).arg(&image)).0, 2);
+}
+
+#[test]
+fn a_library_that_is_no_onnx_runtime_is_said_and_not_a_crash() {
+    let dir = TempDir::new().unwrap();
+    let model = dark_model(dir.path());
+    let pair = pair_of_shadows("bend", dir.path());
+    let image = pair.join("images/view_L.png");
+    let run = |engine: &str| {
+        let mut command = accurate();
+        command.args(["segment", "--engine", engine, "--model"]).arg(&model);
+        command.env("ORT_DYLIB_PATH", dir.path().join("none.so"));
+        command.arg("-o").arg(dir.path().join("out")).arg(&image);
+        command
+    };
+    let (code, message) = failure(&mut run("ort"));
+    assert_eq!(code, 69);
+    assert!(message.contains("none.so"), "{message}");
+    let output = run("auto").assert().success();
+    let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+    assert!(said.contains("going on with rten"), "{said}");
+    let (code, message) = failure(run("ort").env_remove("ORT_DYLIB_PATH"));
+    assert_eq!(code, 69);
+    assert!(message.contains("--onnxruntime"), "{message}");
+}
+
+#[test]
+fn models_are_described_verified_and_refused() {
+    let dir = TempDir::new().unwrap();
+    let model = dark_model(dir.path());
+    let info: Value =
+        serde_json::from_str(&stdout(accurate().args(["--json", "model", "info"]).arg(&model)))
+            .unwrap();
+    assert_eq!((&info["weights"], &info["operations"]), (&Value::from(4), &Value::from(1)));
+    let verified =
+        stdout(accurate().args(["model", "verify"]).arg(&model).env_remove("ORT_DYLIB_PATH"));
+    assert!(verified.contains("sound, runs with rten"), "{verified}");
+    let mut bytes = fs::read(&model).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    fs::write(&model, bytes).unwrap();
+    let (code, message) = failure(accurate().args(["model", "verify"]).arg(&model));
+    assert_eq!(code, 65);
+    assert!(message.contains("dark.accmodel: damaged"), "{message}");
+}
+
+#[test]
+fn nnunet_results_become_a_model_that_runs() {
+    let dir = TempDir::new().unwrap();
+    let folder = dir.path().join("results");
+    fs::create_dir(&folder).unwrap();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../accurate-seg/tests/fixtures");
+    fs::copy(fixtures.join("unet.onnx"), folder.join("network.onnx")).unwrap();
+    let plans = |norm: &str| {
+        serde_json::json!({
+            "dataset_name": "Dataset501_Wires", "plans_name": "nnUNetPlans",
+            "foreground_intensity_properties_per_channel": {
+                "0": {"mean": 90.0, "std": 20.0, "percentile_00_5": 10.0, "percentile_99_5": 200.0}
+            },
+            "configurations": {"2d": {
+                "patch_size": [128, 64], "spacing": [1.0, 1.0],
+                "normalization_schemes": [norm], "use_mask_for_norm": [false],
+                "architecture": {"arch_kwargs": {"strides": [[1, 1], [2, 2]]}},
+            }},
+        })
+    };
+    let dataset = serde_json::json!({
+        "channel_names": {"0": "xray"}, "labels": {"background": 0, "wire": 1},
+        "numTraining": 1, "file_ending": ".png",
+    });
+    fs::write(folder.join("dataset.json"), dataset.to_string()).unwrap();
+    fs::write(folder.join("plans.json"), plans("ZScoreNormalization").to_string()).unwrap();
+    let model = dir.path().join("imported.accmodel");
+    let import = || {
+        let mut command = accurate();
+        command.args(["--json", "model", "import"]).arg(&folder).arg("-o").arg(&model);
+        command
+    };
+    let report: Value = serde_json::from_str(&stdout(&mut import())).unwrap();
+    let manifest = &report["manifest"];
+    assert_eq!(manifest["name"], "imported");
+    assert_eq!(manifest["network"]["multiple_px"], 2);
+    assert_eq!(manifest["network"]["foreground"], serde_json::json!([1]));
+    assert_eq!(manifest["tiling"]["window_px"], serde_json::json!([128, 64]));
+    assert_eq!(manifest["normalisation"]["scheme"], "z-score");
+    let pair = pair_of_shadows("bend", dir.path());
+    let mut segment = accurate();
+    segment
+        .args(["segment", "--mirror", "--model"])
+        .arg(&model)
+        .arg("-o")
+        .arg(dir.path().join("out"));
+    segment.arg(pair.join("images/view_R.png")).assert().success();
+
+    fs::write(folder.join("plans.json"), plans("CTNormalization").to_string()).unwrap();
+    let report: Value = serde_json::from_str(&stdout(&mut import())).unwrap();
+    let fixed = serde_json::json!(
+        {"scheme": "fixed", "low": 10.0, "high": 200.0, "mean": 90.0, "std": 20.0}
+    );
+    assert_eq!(report["manifest"]["normalisation"], fixed);
+    let mut resampled = plans("ZScoreNormalization");
+    resampled["configurations"]["2d"]["spacing"] = serde_json::json!([0.5, 0.5]);
+    let mut other = plans("Foo");
+    other["configurations"]["3d_fullres"] = other["configurations"]["2d"].take();
+    for (bad, word) in [(plans("Foo"), "Foo"), (resampled, "resampled"), (other, "2d")] {
+        fs::write(folder.join("plans.json"), bad.to_string()).unwrap();
+        let (code, message) = failure(&mut import());
+        assert_eq!(code, 65);
+        assert!(message.contains(word), "{message}");
+    }
+}
