@@ -11,7 +11,7 @@ use ndarray::Array2;
 use crate::direction::runs_against;
 use crate::ordered_points::adjusted_points;
 use crate::ring_masks::ring_masks;
-use crate::robust::reconstruct_masks;
+use crate::robust::{reconstruct_masks, without_strays};
 use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled};
 use crate::{
     Diagnostics, Error, Explanation, InputKind, Method, Reconstruction, RobustParams, Traces,
@@ -195,7 +195,17 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         .probabilities
         .as_ref()
         .filter(|_| params.input == InputKind::Image && params.robust.by_probability);
-    let result = reconstruct_masks(masks, maps, &pair.rig, &params.robust, &pair.id)?;
+    // What a person has drawn is the body; what a network has found need not be.
+    let cleaned;
+    let (masks, strays_px) = if params.input == InputKind::Image {
+        let (kept, strays_px) = without_strays(masks, &pair.rig, &pair.id)?;
+        cleaned = kept;
+        (&cleaned, strays_px)
+    } else {
+        (masks, [0, 0])
+    };
+    let mut result = reconstruct_masks(masks, maps, &pair.rig, &params.robust, &pair.id)?;
+    result.explanation.strays_px = strays_px;
     // The curve was fitted under the corrected camera, if one was asked for.
     let rig = match &result.calibration {
         Some(calibration) => &calibration

@@ -3,7 +3,7 @@ use std::ops::ControlFlow;
 use ndarray::{Array2, Axis};
 
 use super::normalise::normalise;
-use super::windows::{reflect_to, starts, window_weights};
+use super::windows::{extend_to, starts, window_weights};
 use super::{Engine, Manifest, ModelBundle, Polarity};
 use crate::{Mask, PostProcessing, Progress, SegError, Segmentation, Segmenter, Watch};
 
@@ -91,7 +91,7 @@ impl NetworkSegmenter {
             tiling.window_px.map(|side| side as usize)
         };
         let sides = [padded[0].max(window[0]), padded[1].max(window[1])];
-        let padded = reflect_to(&image, sides);
+        let padded = extend_to(&image, sides);
         let probability = self.in_windows(&padded.image, window, watch)?;
         let [top, left] = padded.before;
         Ok(Array2::from_shape_fn((height, width), |(row, col)| {

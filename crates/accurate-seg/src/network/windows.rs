@@ -1,32 +1,24 @@
 use ndarray::Array2;
 
-/// An image with sides made larger by reflection, and how much was added before its first row and
+/// An image with sides made larger by its border, and how much was added before its first row and
 /// column.
 pub(super) struct Padded {
     pub image: Array2<f32>,
     pub before: [usize; 2],
 }
 
-/// Reflects the image about its border pixels (which are not repeated) until its sides are `sides`,
-/// half of the addition on either side, the odd one behind.
-pub(super) fn reflect_to(image: &Array2<f32>, sides: [usize; 2]) -> Padded {
+/// Lets the border pixels of the image go on until its sides are `sides`, half of the addition on
+/// either side, the odd one behind. Reflection would make a thin dark line, like a wire, of the edge
+/// of a collimator near the border.
+pub(super) fn extend_to(image: &Array2<f32>, sides: [usize; 2]) -> Padded {
     let (height, width) = image.dim();
     let before = [(sides[0] - height) / 2, (sides[1] - width) / 2];
+    let within =
+        |at: usize, before: usize, length: usize| at.saturating_sub(before).min(length - 1);
     let padded = Array2::from_shape_fn((sides[0], sides[1]), |(row, col)| {
-        image[[reflected(row, before[0], height), reflected(col, before[1], width)]]
+        image[[within(row, before[0], height), within(col, before[1], width)]]
     });
     Padded { image: padded, before }
-}
-
-/// Index within `0..length` of position `at - before`, bounced off both ends as often as needed.
-fn reflected(at: usize, before: usize, length: usize) -> usize {
-    if length == 1 {
-        return 0;
-    }
-    let period = 2 * (length - 1);
-    // at - before modulo the period, without going below zero.
-    let shifted = (at + period - before % period) % period;
-    if shifted < length { shifted } else { period - shifted }
 }
 
 /// Where windows begin along one axis: from 0 to `length - window`, equally spaced, at most half a
@@ -60,11 +52,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reflection_does_not_repeat_the_border() {
+    fn the_border_goes_on() {
         let row = Array2::from_shape_vec((1, 3), vec![1.0, 2.0, 3.0]).unwrap();
-        let padded = reflect_to(&row, [1, 10]);
-        assert_eq!(padded.before, [0, 3]);
-        let expected = [2.0, 3.0, 2.0, 1.0, 2.0, 3.0, 2.0, 1.0, 2.0, 3.0];
+        let padded = extend_to(&row, [1, 8]);
+        assert_eq!(padded.before, [0, 2]);
+        let expected = [1.0, 1.0, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0];
         assert_eq!(padded.image.into_raw_vec_and_offset().0, expected);
     }
 
@@ -74,7 +66,7 @@ mod tests {
             height in 1_usize..9, width in 1_usize..9, more in (0_usize..20, 0_usize..20),
         ) {
             let image = Array2::from_shape_fn((height, width), |(r, c)| (10 * r + c) as f32);
-            let padded = reflect_to(&image, [height + more.0, width + more.1]);
+            let padded = extend_to(&image, [height + more.0, width + more.1]);
             for ((r, c), value) in image.indexed_iter() {
                 prop_assert_eq!(padded.image[[r + padded.before[0], c + padded.before[1]]], *value);
             }

@@ -9,9 +9,11 @@ mod score;
 mod search;
 mod shape;
 mod start;
+mod strays;
 mod suspicion;
 
 pub use evidence::Evidence;
 pub(crate) use joint::{JointResult, reconstruct_masks};
 pub use joint::{RobustParams, SecondLook};
+pub(crate) use strays::without_strays;
 pub use suspicion::Suspicion;
