@@ -191,19 +191,18 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         .masks
         .as_ref()
         .ok_or_else(|| Error::MissingInput { case: pair.id.clone(), input: params.input })?;
-    let maps = pair
-        .probabilities
-        .as_ref()
-        .filter(|_| params.input == InputKind::Image && params.robust.by_probability);
+    let maps = pair.probabilities.as_ref().filter(|_| params.input == InputKind::Image);
     // What a person has drawn is the body; what a network has found need not be.
     let cleaned;
-    let (masks, strays_px) = if params.input == InputKind::Image {
-        let (kept, strays_px) = without_strays(masks, &pair.rig, &pair.id)?;
-        cleaned = kept;
-        (&cleaned, strays_px)
-    } else {
-        (masks, [0, 0])
+    let (masks, strays_px) = match maps {
+        Some(maps) => {
+            let (kept, strays_px) = without_strays(masks, maps, &pair.rig, &pair.id)?;
+            cleaned = kept;
+            (&cleaned, strays_px)
+        }
+        None => (masks, [0, 0]),
     };
+    let maps = maps.filter(|_| params.robust.by_probability);
     let mut result = reconstruct_masks(masks, maps, &pair.rig, &params.robust, &pair.id)?;
     result.explanation.strays_px = strays_px;
     // The curve was fitted under the corrected camera, if one was asked for.
