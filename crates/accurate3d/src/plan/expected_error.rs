@@ -15,7 +15,7 @@ pub(super) struct ExpectedError {
 }
 
 /// The error across the tangent to expect if both views measure the curve across its images with
-/// `sigma_px`; `None` if the curve is nowhere measured.
+/// `sigma_px`; `None` if the curve is nowhere measured, as by two views from one place.
 ///
 /// Each view gives one equation per px of its trace, `n J δ = e`, with `J` the Jacobian of the
 /// projection, `n` across the image of the tangent and errors independent from px to px. Their
@@ -27,6 +27,11 @@ pub(super) fn expected_error(
     params: &PlanParams,
 ) -> Option<ExpectedError> {
     let n = shape.len();
+    let apart = (cameras[0].centre() - cameras[1].centre()).norm();
+    // Rounding of the pose is of the order of 1e-15 of the distance.
+    if !(apart > 1e-9 * (cameras[0].centre() - shape.first()?).norm()) {
+        return None;
+    }
     let length: f64 = shape.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
     // Unit tangents, and the length that each sample stands for.
     let steps: Vec<(Vector3<f64>, f64)> = (0..n)
