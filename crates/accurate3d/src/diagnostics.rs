@@ -129,12 +129,19 @@ pub struct OutlineDiagnostics {
     pub margin: Option<f64>,
     /// Pairs of walks that were fitted.
     pub fits: usize,
+    /// Pixels of each view's mask that were left out before the search: pieces found in an image
+    /// that are fainter than the rest or that the other view speaks against.
+    pub strays_px: [usize; 2],
     /// What bears on whether the curve is the right one.
     pub evidence: Evidence,
 }
 
 impl Diagnostics {
-    pub(crate) fn of_joint(result: &JointResult, along_epipolar_line: &[bool]) -> Self {
+    pub(crate) fn of_joint(
+        result: &JointResult,
+        strays_px: [usize; 2],
+        along_epipolar_line: &[bool],
+    ) -> Self {
         let judgement = &result.fit.judgement;
         Self {
             mean_epipolar_distance_px: result.mean_distance_px,
@@ -152,6 +159,7 @@ impl Diagnostics {
                 chi_per_point: judgement.chi_per_point(),
                 margin: result.margin.is_finite().then_some(result.margin),
                 fits: result.fits,
+                strays_px,
                 evidence: result.evidence,
             }),
             calibration: result.calibration.as_ref().map(CalibrationDiagnostics::from),

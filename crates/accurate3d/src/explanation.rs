@@ -10,9 +10,6 @@ pub struct Explanation {
     pub candidates: Vec<ConsideredCurve>,
     /// What the chosen walk of each view did where strands meet, in order along the walk.
     pub junctions: [Vec<JunctionDecision>; 2],
-    /// Pixels of each view's mask that were left out as no part of the body: pieces found in an
-    /// image that the other view speaks against.
-    pub strays_px: [usize; 2],
 }
 
 /// A curve of the last choice.

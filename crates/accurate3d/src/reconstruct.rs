@@ -203,8 +203,7 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         None => (masks, [0, 0]),
     };
     let maps = maps.filter(|_| params.robust.by_probability);
-    let mut result = reconstruct_masks(masks, maps, &pair.rig, &params.robust, &pair.id)?;
-    result.explanation.strays_px = strays_px;
+    let result = reconstruct_masks(masks, maps, &pair.rig, &params.robust, &pair.id)?;
     // The curve was fitted under the corrected camera, if one was asked for.
     let rig = match &result.calibration {
         Some(calibration) => &calibration
@@ -216,7 +215,7 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         sampled(&result.fit.curve, result.fit.covariance.as_ref(), rig);
     let along_epipolar_line = along_epipolar_lines(&points, rig)
         .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;
-    let diagnostics = Diagnostics::of_joint(&result, &along_epipolar_line);
+    let diagnostics = Diagnostics::of_joint(&result, strays_px, &along_epipolar_line);
     let explanation = result.explanation.clone();
     Ok(Reconstruction {
         id: pair.id.clone(),

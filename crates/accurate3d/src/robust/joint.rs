@@ -156,7 +156,6 @@ pub(crate) fn reconstruct_masks(
     let explanation = Explanation {
         candidates: std::iter::once(&fit).chain(&rivals).map(Candidate::considered).collect(),
         junctions: [view1.junctions(i), view2.junctions(j)],
-        strays_px: [0, 0],
     };
     Ok(JointResult {
         explanation,
