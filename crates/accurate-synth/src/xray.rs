@@ -106,19 +106,26 @@ impl XrayOptions {
 /// # Cost
 /// About 0.1 s for 512 x 512 px.
 pub fn render_xray(case: &SynthCase, options: &XrayOptions) -> [Array2<u16>; 2] {
+    [0, 1].map(|view| render_xray_of_view(case, view, options))
+}
+
+/// The picture of one view, 0 or 1; the views have streams of their own.
+pub(crate) fn render_xray_of_view(
+    case: &SynthCase,
+    view: usize,
+    options: &XrayOptions,
+) -> Array2<u16> {
     let options = options.clamped();
-    let cameras = [case.true_rig.camera1(), case.true_rig.camera2()];
-    [0, 1].map(|v| {
-        let stream = |what: &str| {
-            let name = format!("xray-{what}-{}", v + 1);
-            case_rng(case.family, case.seed, case.index, &name)
-        };
-        let mut optical_depth = wire_depth(case, v, cameras[v], options.contrast);
-        add_scene(&mut optical_depth, case, v, cameras[v], &options, &mut stream("anatomy"));
-        let mut intensity = optical_depth.mapv(|depth| (-depth).exp());
-        blur(&mut intensity, options.blur_sigma_px);
-        detect(&intensity, &options, &mut stream("noise"))
-    })
+    let camera = [case.true_rig.camera1(), case.true_rig.camera2()][view];
+    let stream = |what: &str| {
+        let name = format!("xray-{what}-{}", view + 1);
+        case_rng(case.family, case.seed, case.index, &name)
+    };
+    let mut optical_depth = wire_depth(case, view, camera, options.contrast);
+    add_scene(&mut optical_depth, case, view, camera, &options, &mut stream("anatomy"));
+    let mut intensity = optical_depth.mapv(|depth| (-depth).exp());
+    blur(&mut intensity, options.blur_sigma_px);
+    detect(&intensity, &options, &mut stream("noise"))
 }
 
 /// Optical depth of the wire in one view.

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::wander::log_uniform;
 use super::{XraySample, in_image, label};
 use crate::projection::Projection;
-use crate::xray::{XrayOptions, XrayResponse, render_xray};
+use crate::xray::{XrayOptions, XrayResponse, render_xray_of_view};
 use crate::{CaseOptions, Family, generate};
 
 /// Families, in the shares in which they are drawn: the arms of the table count twice.
@@ -48,7 +48,7 @@ pub(crate) fn draw(rng: &mut ChaCha8Rng, side: u32, seed: u64, index: u64) -> Op
     let view = rng.random_range(0..2_usize);
     let camera = [case.true_rig.camera1(), case.true_rig.camera2()][view];
     let course = Projection::new(camera, &case.truth).ok()?;
-    let picture = &render_xray(&case, &options)[view];
+    let picture = render_xray_of_view(&case, view, &options);
     let (rows, columns) = picture.dim();
     let square = side as usize;
     let (free_rows, free_columns) = (rows.saturating_sub(square), columns.saturating_sub(square));
