@@ -98,7 +98,6 @@ pub(crate) struct JointResult {
     pub(crate) margin: f64,
     pub(crate) fits: usize,
     /// What the curve says about the calibration of view 2, if asked.
-    #[allow(dead_code, reason = "for the diagnostics")]
     pub(crate) calibration: Option<CalibrationEstimate>,
     /// Reasons to doubt the result; none for most right ones.
     pub(crate) suspicions: Vec<Suspicion>,
