@@ -35,13 +35,15 @@ pub fn cameras_of(files: &[PathBuf], defaults: &ViewDefaults) -> Result<Vec<Name
     Ok(views)
 }
 
-/// The two cameras that the options name; those of `files` where no camera file is named.
-pub fn two_cameras(args: &ViewArgs, files: &[PathBuf]) -> Result<[NamedView; 2], Failure> {
-    let defaults = ViewDefaults { image_size: args.image_size, unit: args.unit };
-    let sources = if args.cameras.is_empty() { files } else { &args.cameras };
-    let views = cameras_of(sources, &defaults)?;
+/// The two cameras of `files`: those that `wanted` names, in that order, or all there are.
+pub fn two_cameras(
+    files: &[PathBuf],
+    wanted: &[String],
+    defaults: &ViewDefaults,
+) -> Result<[NamedView; 2], Failure> {
+    let views = cameras_of(files, defaults)?;
     let names = || views.iter().map(|v| v.name.as_str()).collect::<Vec<_>>().join(", ");
-    let chosen: Vec<NamedView> = match args.views.as_slice() {
+    let chosen: Vec<NamedView> = match wanted {
         [] => views.clone(),
         wanted => wanted
             .iter()
@@ -100,7 +102,10 @@ pub fn pair_of_files(args: &ReconstructArgs) -> Result<(Pair, Vec<PathBuf>), Fai
             two.display()
         )));
     }
-    let views = two_cameras(&args.views, &args.inputs)?;
+    let ViewArgs { cameras, views, stated } = &args.views;
+    // A DICOM run is its own camera file.
+    let camera_files = if cameras.is_empty() { &args.inputs } else { cameras };
+    let views = two_cameras(camera_files, views, &stated.defaults())?;
     let paths = [one.clone(), two.clone()];
     let files = match args.input {
         InputKind::Points => ViewFiles::Points(paths),

@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use accurate3d::geom::{ImageSize, LengthUnit};
+use accurate3d::io::ViewDefaults;
 use clap::{Args, Subcommand, ValueEnum};
 
 #[derive(Debug, Subcommand)]
@@ -20,12 +21,25 @@ pub struct CameraArgs {
     /// folders. The kind is told by content.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
-    /// Image size, for files that state none.
+    #[command(flatten)]
+    pub stated: StatedArgs,
+}
+
+/// What a user states where a camera file does not.
+#[derive(Debug, Args)]
+pub struct StatedArgs {
+    /// Image size, for camera files that state none.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub image_size: Option<ImageSize>,
-    /// Unit of the world (mm, cm, m or unit), for files that state none.
+    /// Unit of the world (mm, cm, m or unit), for camera files that state none.
     #[arg(long)]
     pub unit: Option<LengthUnit>,
+}
+
+impl StatedArgs {
+    pub fn defaults(&self) -> ViewDefaults {
+        ViewDefaults { image_size: self.image_size, unit: self.unit }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -77,12 +91,8 @@ pub struct DoctorArgs {
     /// The two views to take, by name, where the files hold more or another order.
     #[arg(long, value_name = "NAME,NAME", value_delimiter = ',')]
     pub views: Vec<String>,
-    /// Image size, for files that state none.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    pub image_size: Option<ImageSize>,
-    /// Unit of the world (mm, cm, m or unit), for files that state none.
-    #[arg(long)]
-    pub unit: Option<LengthUnit>,
+    #[command(flatten)]
+    pub stated: StatedArgs,
     /// Points of which row i of one file belongs to row i of the other (beads, tips): CSV with the
     /// columns x and y. They tell most.
     #[arg(long, num_args = 2, value_names = ["CSV1", "CSV2"])]
@@ -116,12 +126,8 @@ pub struct PlanArgs {
     /// Which view of that file, by name, where it holds more.
     #[arg(long, value_name = "NAME")]
     pub view: Option<String>,
-    /// Image size, for camera files that state none.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    pub image_size: Option<ImageSize>,
-    /// Unit of the world (mm, cm, m or unit), for camera files that state none.
-    #[arg(long)]
-    pub unit: Option<LengthUnit>,
+    #[command(flatten)]
+    pub stated: StatedArgs,
     /// Primary angles that the second view may have, degrees.
     #[arg(long, value_name = "MIN..MAX", default_value = "-90..90", value_parser = parse_angles,
         allow_hyphen_values = true)]
@@ -163,10 +169,6 @@ pub struct ViewArgs {
     /// The two views to take, by name, where the files hold more or another order.
     #[arg(long, value_name = "NAME,NAME", value_delimiter = ',')]
     pub views: Vec<String>,
-    /// Image size, for camera files that state none.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    pub image_size: Option<ImageSize>,
-    /// Unit of the world (mm, cm, m or unit), for camera files that state none.
-    #[arg(long)]
-    pub unit: Option<LengthUnit>,
+    #[command(flatten)]
+    pub stated: StatedArgs,
 }

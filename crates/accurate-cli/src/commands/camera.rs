@@ -1,4 +1,4 @@
-use accurate3d::io::{CameraFormat, NamedView, ViewDefaults, write_cameras};
+use accurate3d::io::{CameraFormat, NamedView, write_cameras};
 
 use super::doctor;
 use crate::args::{CameraArgs, CameraCommand, CameraTarget, ConvertArgs};
@@ -16,7 +16,7 @@ pub fn run(command: &CameraCommand, console: &Console) -> Result<(), Failure> {
 }
 
 fn views(args: &CameraArgs) -> Result<Vec<NamedView>, Failure> {
-    cameras_of(&args.files, &ViewDefaults { image_size: args.image_size, unit: args.unit })
+    cameras_of(&args.files, &args.stated.defaults())
 }
 
 fn show(args: &CameraArgs, console: &Console) -> Result<(), Failure> {

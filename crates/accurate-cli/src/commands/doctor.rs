@@ -12,7 +12,7 @@ use accurate3d::seg::{Mask, Skeleton, zhang_suen};
 use accurate3d::traverse::{TraverseParams, trace_single};
 use serde_json::{Value, json};
 
-use crate::args::{DoctorArgs, ViewArgs};
+use crate::args::DoctorArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::two_views::two_cameras;
@@ -64,13 +64,8 @@ fn examined(args: &DoctorArgs) -> Result<([NamedView; 2], Option<Seen>), Failure
         let (views, seen) = of_pair_folders(&args.files)?;
         return Ok((views, if named { of_files(args)? } else { seen }));
     }
-    let views = ViewArgs {
-        cameras: Vec::new(),
-        views: args.views.clone(),
-        image_size: args.image_size,
-        unit: args.unit,
-    };
-    Ok((two_cameras(&views, &args.files)?, of_files(args)?))
+    let views = two_cameras(&args.files, &args.views, &args.stated.defaults())?;
+    Ok((views, of_files(args)?))
 }
 
 /// What the options name.

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use accurate3d::NOT_FOR_CLINICAL_USE;
 use accurate3d::geom::LengthUnit;
-use accurate3d::io::{NamedView, ViewDefaults, read_curve};
+use accurate3d::io::{NamedView, read_curve};
 use accurate3d::plan::{PlanError, PlanParams, PlannedView, ViewPlan, heat_map_svg, plan_views};
 use serde_json::{Value, json};
 
@@ -69,8 +69,7 @@ pub fn run(args: &PlanArgs, console: &Console) -> Result<(), Failure> {
 }
 
 fn first_view(args: &PlanArgs) -> Result<NamedView, Failure> {
-    let defaults = ViewDefaults { image_size: args.image_size, unit: args.unit };
-    let mut views = cameras_of(std::slice::from_ref(&args.first), &defaults)?;
+    let mut views = cameras_of(std::slice::from_ref(&args.first), &args.stated.defaults())?;
     let names = views.iter().map(|v| v.name.clone()).collect::<Vec<_>>().join(", ");
     let index = match &args.view {
         Some(name) => views.iter().position(|view| &view.name == name),

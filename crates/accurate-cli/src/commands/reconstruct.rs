@@ -98,8 +98,8 @@ fn jobs(args: &ReconstructArgs) -> Result<Vec<(Source, Outputs)>, Failure> {
         (args.truth.is_some(), "--truth"),
         (!args.frame.is_empty(), "--frame"),
         (!args.views.views.is_empty(), "--views"),
-        (args.views.image_size.is_some(), "--image-size"),
-        (args.views.unit.is_some(), "--unit"),
+        (args.views.stated.image_size.is_some(), "--image-size"),
+        (args.views.stated.unit.is_some(), "--unit"),
     ] {
         if given {
             let message = format!("{option} is for two views given as files");
