@@ -4,8 +4,8 @@
 
 #[path = "support/mistaken_rigs.rs"]
 mod mistaken_rigs;
-
-use std::path::{Path, PathBuf};
+#[path = "support/shared_data.rs"]
+mod shared_data;
 
 use accurate_geom::nalgebra::Matrix3;
 use accurate_geom::{Camera, ImageSize, LengthUnit, Point2, Rig};
@@ -13,6 +13,7 @@ use accurate_io::{read_matrix3, read_matrix3x4, read_points};
 use accurate_synth::{CaseOptions, Family, generate};
 use accurate3d::doctor::{Diagnosis, DoctorError, Mistake, Remark, Seen, Verdict, Which, diagnose};
 use mistaken_rigs::{Scene, means, mistakes, sound, spoiled};
+use shared_data::shared_data;
 
 const MM: LengthUnit = LengthUnit::Millimetre;
 
@@ -155,24 +156,11 @@ fn curves_alone_tell_gross_mistakes_and_keep_quiet_on_sound_rigs() {
     }
 }
 
-fn guide3d() -> Option<PathBuf> {
-    let root = std::env::var_os("ACCURATE_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    let path = root.join("guide3d/pairs");
-    if path.is_dir() {
-        return Some(path);
-    }
-    eprintln!("skipped: no guide3d under ACCURATE_DATA");
-    None
-}
-
 /// Published real annotations: the published loader exchanges the cameras, and the pixels as clicked
 /// are distorted while K, R, t hold for undistorted ones.
 #[test]
 fn the_published_camera_order_of_guide3d_is_found() {
-    let Some(pairs) = guide3d() else { return };
+    let Some(pairs) = shared_data("guide3d/pairs") else { return };
     let calibration = pairs.join("case_000/calibration");
     let size = ImageSize { width: 1024, height: 1024 };
     let cameras = ["L", "R"].map(|letter| {

@@ -1,6 +1,9 @@
 //! `accurate` mode on ordered points: rings, a wrong calibration, turned images, threads.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "support/turned_cameras.rs"]
+mod turned_cameras;
+
 use accurate3d::eval::curve_scores;
 use accurate3d::fit::CalibrationPriors;
 use accurate3d::geom::nalgebra::{Matrix3, Rotation3, Vector3};
@@ -11,6 +14,7 @@ use accurate3d::{
     Closure, Error, InputKind, Method, Params, Reconstruction, ViewPair, reconstruct,
 };
 use ndarray::Array2;
+use turned_cameras::{mirrored, transposed};
 
 const SEED: u64 = 1907;
 const SIZE: u32 = 512;
@@ -140,21 +144,9 @@ enum Turn {
 
 impl Turn {
     fn camera(self, camera: &Camera) -> Camera {
-        let size = camera.size();
         match self {
-            Self::MirrorX => {
-                let mut mirror = Matrix3::identity();
-                mirror[(0, 0)] = -1.0;
-                mirror[(0, 2)] = f64::from(size.width) - 1.0;
-                Camera::new(mirror * camera.k(), *camera.r(), *camera.t(), size).unwrap()
-            }
-            Self::Transpose => {
-                let swap = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
-                let flip = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
-                let k = swap * camera.k() * swap * flip;
-                let size = ImageSize { width: size.height, height: size.width };
-                Camera::new(k, flip * swap * camera.r(), flip * swap * camera.t(), size).unwrap()
-            }
+            Self::MirrorX => mirrored(camera),
+            Self::Transpose => transposed(camera),
         }
     }
 

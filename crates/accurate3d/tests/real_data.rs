@@ -2,26 +2,17 @@
 //! checkout. Not shipped; without them these tests say that they were skipped.
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
-use std::path::{Path, PathBuf};
+#[path = "support/shared_data.rs"]
+mod shared_data;
+
+use std::path::Path;
 
 use accurate3d::geom::{
     Camera, ImageSize, LengthUnit, Pixel, Point3, Rig, Triangulation, Triangulator,
 };
 use accurate3d::io::{PairParts, find_pairs, read_matrix3, read_matrix3x4, read_pair};
 use accurate3d::{InputKind, Method, Params, ViewPair, reconstruct};
-
-fn data(set: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("ACCURATE_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    let path = root.join(set);
-    if path.is_dir() {
-        return Some(path);
-    }
-    eprintln!("skipped: no {set} under ACCURATE_DATA");
-    None
-}
+use shared_data::shared_data;
 
 fn camera(dir: &Path, view: &str) -> Camera {
     let k = read_matrix3(&dir.join(format!("K_{view}.txt"))).unwrap();
@@ -33,7 +24,7 @@ fn camera(dir: &Path, view: &str) -> Camera {
 
 #[test]
 fn calibration_beads_triangulate_to_a_seventh_of_a_millimetre() {
-    let Some(dir) = data("guide3d/beads") else { return };
+    let Some(dir) = shared_data("guide3d/beads") else { return };
     let unit = LengthUnit::Centimetre;
     let rig = Rig::new(camera(&dir, "L"), camera(&dir, "R"), unit).unwrap();
     let mut reader = csv::Reader::from_path(dir.join("beads.csv")).unwrap();
@@ -59,7 +50,7 @@ fn calibration_beads_triangulate_to_a_seventh_of_a_millimetre() {
 /// the corner-to-corner method, which forces the tail that only one view sees.
 #[test]
 fn paper_mode_reconstructs_every_guide3d_pair_corner_to_corner() {
-    let Some(dir) = data("guide3d/pairs") else { return };
+    let Some(dir) = shared_data("guide3d/pairs") else { return };
     let pairs = find_pairs(&dir).unwrap();
     assert_eq!(pairs.len(), 12);
     for dir in pairs {
@@ -76,7 +67,7 @@ fn paper_mode_reconstructs_every_guide3d_pair_corner_to_corner() {
 /// Our own mode finds the direction, leaves the tail that one view alone sees, and agrees.
 #[test]
 fn accurate_mode_agrees_on_the_part_that_both_views_see() {
-    let Some(dir) = data("guide3d/pairs") else { return };
+    let Some(dir) = shared_data("guide3d/pairs") else { return };
     let mut close = 0;
     for dir in find_pairs(&dir).unwrap() {
         let parts = PairParts { points: true, ..PairParts::default() };

@@ -1,12 +1,15 @@
 //! The reconstruction from masks does not depend on how the images lie or which is called the first.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "support/turned_cameras.rs"]
+mod turned_cameras;
+
 use accurate3d::eval::curve_scores;
-use accurate3d::geom::nalgebra::{Matrix3, Vector3};
-use accurate3d::geom::{Camera, ImageSize, Point3, Rig};
+use accurate3d::geom::{Camera, Point3, Rig};
 use accurate3d::synth::{CaseOptions, Family, generate};
 use accurate3d::{InputKind, Method, Params, ViewPair, reconstruct};
 use ndarray::{Array2, Axis};
+use turned_cameras::{mirrored, transposed};
 
 /// How an image is turned.
 #[derive(Debug, Clone, Copy)]
@@ -30,24 +33,12 @@ impl Turn {
         }
     }
 
-    /// The camera whose image is the turned one. `K` stays upper triangular, `R` a rotation.
+    /// The camera whose image is the turned one.
     fn camera(self, camera: &Camera) -> Camera {
         match self {
-            Self::MirrorX => {
-                let size = camera.size();
-                let mut mirror = Matrix3::identity();
-                mirror[(0, 0)] = -1.0;
-                mirror[(0, 2)] = f64::from(size.width) - 1.0;
-                Camera::new(mirror * camera.k(), *camera.r(), *camera.t(), size).unwrap()
-            }
-            Self::Transpose => {
-                let swap = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
-                let flip = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
-                let k = swap * camera.k() * swap * flip;
-                let size = ImageSize { width: camera.size().height, height: camera.size().width };
-                Camera::new(k, flip * swap * camera.r(), flip * swap * camera.t(), size).unwrap()
-            }
-            Self::Rotate90 => Self::MirrorX.camera(&Self::Transpose.camera(camera)),
+            Self::MirrorX => mirrored(camera),
+            Self::Transpose => transposed(camera),
+            Self::Rotate90 => mirrored(&transposed(camera)),
         }
     }
 }

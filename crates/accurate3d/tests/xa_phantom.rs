@@ -7,7 +7,10 @@
 //! 0.55 mm (IM1 and IM2) and 0.49 mm (IM3 and IM4).
 #![allow(clippy::unwrap_used, clippy::print_stderr)]
 
-use std::path::{Path, PathBuf};
+#[path = "support/shared_data.rs"]
+mod shared_data;
+
+use std::path::Path;
 
 use accurate3d::eval::curve_scores;
 use accurate3d::geom::nalgebra::Matrix3x4;
@@ -16,22 +19,10 @@ use accurate3d::io::read_mask;
 use accurate3d::seg::{Mask, Skeleton};
 use accurate3d::{InputKind, Method, Params, ViewPair, reconstruct};
 use serde_json::Value;
+use shared_data::shared_data;
 
 /// A reference point farther than this from the skeleton is not seen by the threshold mask, px.
 const SEEN_PX: f64 = 6.0;
-
-fn data() -> Option<PathBuf> {
-    let root = std::env::var_os("ACCURATE_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    let path = root.join("xa-phantom/derived");
-    if path.is_dir() {
-        return Some(path);
-    }
-    eprintln!("skipped: no xa-phantom under ACCURATE_DATA");
-    None
-}
 
 struct XaView {
     camera: Camera,
@@ -93,7 +84,7 @@ fn branches(dir: &Path) -> Vec<Vec<Point3>> {
 
 #[test]
 fn branches_of_the_phantom_come_back_near_the_floor_of_their_skeletons() {
-    let Some(dir) = data() else { return };
+    let Some(dir) = shared_data("xa-phantom/derived") else { return };
     let text = std::fs::read_to_string(dir.join("geometry.json")).unwrap();
     let geometry: Value = serde_json::from_str(&text).unwrap();
     let branches = branches(&dir);

@@ -7,6 +7,8 @@ mod privacy;
 mod program;
 mod refusals;
 mod segmentation;
+#[path = "../../../accurate3d/tests/support/shared_data.rs"]
+mod shared_data;
 mod synth;
 mod two_views;
 mod xa_phantom;

@@ -13,23 +13,12 @@ use assert_cmd::Command;
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::shared_data::shared_data;
+
 /// A reference point farther than this from the skeleton is not seen by the threshold mask, px.
 const SEEN_PX: f64 = 6.0;
 /// Fewest ordered points that a branch is reconstructed from.
 const LEAST_POINTS: usize = 20;
-
-fn phantom() -> Option<PathBuf> {
-    let root = std::env::var_os("ACCURATE_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    let path = root.join("xa-phantom");
-    if path.is_dir() {
-        return Some(path);
-    }
-    eprintln!("skipped: no xa-phantom under ACCURATE_DATA");
-    None
-}
 
 fn json(command: &mut Command) -> Value {
     let assert = command.assert().success();
@@ -80,7 +69,7 @@ fn branches(phantom: &Path) -> Vec<Vec<Point3>> {
 
 #[test]
 fn branches_of_the_phantom_come_out_of_two_dicom_runs() {
-    let Some(phantom) = phantom() else { return };
+    let Some(phantom) = shared_data("xa-phantom") else { return };
     let dir = TempDir::new().unwrap();
     let known: Value =
         serde_json::from_str(&fs::read_to_string(phantom.join("derived/geometry.json")).unwrap())
