@@ -133,8 +133,36 @@ fn fit_with_knots(
     } else {
         Matrix3::zeros()
     };
+    let surprise = surprise(&minimiser, &inverse, params, adaptive);
     let fit = finish(minimiser, params, steps + more, converged, Some((&inverse, variance)))?;
+    let fit = OutlineFit { surprise: Some(surprise), ..fit };
     Ok(Posterior { fit, nuisance, nuisance_covariance })
+}
+
+/// [`OutlineFit::surprise`] at the current curve, which is smoothed and judged.
+fn surprise(
+    minimiser: &Minimiser<'_>,
+    inverse: &SelectedInverse,
+    params: &OutlineFitParams,
+    adaptive: &AdaptiveParams,
+) -> f64 {
+    let Minimiser { problem, current, .. } = minimiser;
+    let spline = &current.state.spline;
+    let settings = final_settings(params, &SmoothnessScale::new(spline, problem.px_per_unit));
+    let variance = adaptive.noise_inflation / 18.0;
+    // A boundary point that is no datum counts as one of the size of the noise, or leaving points out
+    // would pay.
+    let points = problem.outlines.iter().map(|outline| outline.points.len()).sum::<usize>();
+    let used = current.rows.iter().filter(|row| row.held && !row.outside).count();
+    let unused = points.saturating_sub(used) as f64 / adaptive.noise_inflation;
+    let cost = problem.cost(current, &settings) / variance + unused;
+    // The prior's own measure; what it leaves open (9 unknowns) is the same in every fit.
+    let prior: f64 = (0..spline.spans())
+        .map(|k| problem.local_smoothness.get(k).copied().unwrap_or(1.0))
+        .map(|factor| 3.0 * (settings.lambda3 * factor / variance).ln())
+        .sum();
+    let unknowns = 3.0 * spline.control.len() as f64;
+    cost - prior + inverse.log_determinant() - unknowns * variance.ln()
 }
 
 /// Alternates smoothness and curve; returns the steps taken and the inverse of the final normal

@@ -32,6 +32,11 @@ pub struct OutlineFit {
     pub smoothness: Vec<f64>,
     /// Uncertainty of the curve; only of an adaptive fit, whose smoothness is the data's own.
     pub covariance: Option<CurveCovariance>,
+    /// -2 ln of the probability of the outlines (Laplace's approximation), up to a constant of the
+    /// outlines; only of an adaptive fit. Of several fits that explain the same outlines the one with
+    /// the least is the likeliest: residuals and bends are weighed by what noise and smoothness were
+    /// found to be.
+    pub surprise: Option<f64>,
 }
 
 /// Fits one 3D curve to both outlines: every boundary point must lie one half thickness from the
@@ -149,6 +154,7 @@ pub(crate) fn finish(
         steps,
         converged,
         smoothness,
+        surprise: None,
         covariance: posterior
             .map(|(inverse, variance)| CurveCovariance::new(inverse, controls, variance)),
     })

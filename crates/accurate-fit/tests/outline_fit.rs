@@ -161,6 +161,44 @@ fn the_frame_and_unit_of_the_world_do_not_matter() {
     }
 }
 
+/// The law by which one of several fits to the same outlines is chosen.
+#[test]
+fn a_curve_that_cannot_follow_the_outlines_is_more_surprising_in_every_frame() {
+    let s = scene(Family::Helix, 1, None);
+    let rig = &s.case.rig;
+    let adaptive = AdaptiveParams { min_knot_spacing_px: 1e3, ..AdaptiveParams::DEFAULT };
+    let surprise = |points: &[Point3], pair: &OutlinePair<'_>, rig: &Rig, knot_spacing_px: f64| {
+        let start = Curve3::interpolate(points).unwrap();
+        let params = OutlineFitParams { knot_spacing_px, ..OutlineFitParams::DEFAULT };
+        let fit = fit_outlines_adaptively(&start, pair, rig, &params, &adaptive).unwrap();
+        fit.surprise.unwrap()
+    };
+    let truth: Vec<Point3> = s.case.truth.iter().step_by(20).copied().collect();
+    let pair = OutlinePair::new(&s.one, &s.two);
+    // A turn of a helix has radius 15 px or more: knots 8 or 12 px apart follow it, 60 px apart they
+    // cut through it and leave boundary points pixels off, each of which costs 1 px² / (3/18 px²).
+    let [close, wider, far] = [8.0, 12.0, 60.0].map(|px| surprise(&truth, &pair, rig, px));
+    assert!(far - close > 6.0 * 10.0, "{close} {far}");
+    // Knots that suffice are as likely as more of them, up to what the estimate of the smoothness
+    // leaves open.
+    assert!((close - wider).abs() < 0.2 * (far - close), "{close} {wider} {far}");
+
+    // Another unit adds the same to all.
+    let scaled = |rig: &Rig, scale: f64| {
+        let camera = |c: &Camera| Camera::new(*c.k(), *c.r(), c.t() * scale, c.size()).unwrap();
+        Rig::new(camera(rig.camera1()), camera(rig.camera2()), rig.unit()).unwrap()
+    };
+    let small: Vec<Point3> = truth.iter().map(|p| p * 0.01).collect();
+    let [close_small, far_small] =
+        [8.0, 60.0].map(|px| surprise(&small, &pair, &scaled(rig, 0.01), px));
+    assert!(((far - close) - (far_small - close_small)).abs() < 0.1, "{far_small} {close_small}");
+
+    let one = Outline::<View1>::from_mask(s.case.masks[1].view()).unwrap();
+    let two = Outline::<View2>::from_mask(s.case.masks[0].view()).unwrap();
+    let exchanged = surprise(&truth, &OutlinePair::new(&one, &two), &rig.swapped(), 8.0);
+    assert!((exchanged - close).abs() < 0.1, "{exchanged} {close}");
+}
+
 #[test]
 fn exchanging_the_views_changes_nothing() {
     let s = scene(Family::Medium, 2, None);

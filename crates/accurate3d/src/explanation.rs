@@ -19,8 +19,10 @@ pub struct ConsideredCurve {
     pub walks: [usize; 2],
     /// Whether the walk of view 2 was turned round.
     pub reversed: bool,
-    /// What the choice compares; the least wins.
+    /// What the search compares; what is close to the least is fitted once more.
     pub score: f64,
+    /// What the choice compares among those; the least wins. On the scale of the score.
+    pub unlikeliness: Option<f64>,
     /// Outline that the curve does not explain, cut faces aside; 0 at the truth.
     pub unexplained: f64,
     /// Curve that the masks do not show; 0 at the truth.

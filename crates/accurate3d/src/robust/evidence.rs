@@ -17,8 +17,8 @@ pub struct Evidence {
     pub chi_per_point: f64,
     /// The largest such mean over 50 px of the curve.
     pub worst_chi_per_point: f64,
-    /// By how much the best curve that is another one (somewhere more than 5 px away) is worse; none
-    /// if there is no other.
+    /// By how much the likeliest curve that is another one (somewhere more than 5 px away) is less
+    /// likely, in twelfths of -2 ln of the probability; none if there is no other.
     pub margin: Option<f64>,
     /// Mean Sampson distance of the walks that the curve started from, px.
     pub walks_distance_px: f64,

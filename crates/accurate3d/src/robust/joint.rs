@@ -1,7 +1,4 @@
-use accurate_fit::{
-    AdaptiveParams, CalibrationEstimate, CalibrationPriors, OutlineFit, OutlinePair,
-    fit_outlines_adaptively,
-};
+use accurate_fit::{CalibrationEstimate, CalibrationPriors, OutlineFit, OutlinePair};
 use accurate_geom::{Pixel, Rig, View1, View2};
 use accurate_match::ProposeParams;
 use accurate_traverse::WalkParams;
@@ -93,8 +90,8 @@ pub(crate) struct JointResult {
     pub(crate) coverage: [f64; 2],
     /// Mean Sampson distance of the chosen walks' alignment, px.
     pub(crate) mean_distance_px: f64,
-    /// Score of the best fit that is another curve, minus the chosen one's; infinite if there is
-    /// none.
+    /// How much less likely the likeliest other curve is, on the scale of a score; infinite if there
+    /// is none.
     pub(crate) margin: f64,
     pub(crate) fits: usize,
     /// What the curve says about the calibration of view 2, if asked.
@@ -109,6 +106,8 @@ pub(crate) struct JointResult {
 
 /// Curves nowhere farther apart than this do not compete, px.
 const RIVAL_PX: f64 = 5.0;
+/// Finalists whose scores are no more than this behind the best may turn out likelier.
+const CONTENDER: f64 = 10.0;
 
 /// Proposes, pairs, fits, judges; by the probability maps behind the masks, where they are given.
 ///
@@ -128,16 +127,14 @@ pub(crate) fn reconstruct_masks(
     let outlines = OutlinePair::new(&outline1, &outline2)
         .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));
     let mut search = Search { outlines: &outlines, rig, params, case, effort: Effort::Quick };
-    let mut choice = choose(&search, &mut view1, &mut view2, None)?;
-    let corrected = params
-        .calibration
-        .and_then(|priors| search.calibrated(&choice.best, rig, &priors))
-        .and_then(|first| first.calibration.correct(rig).ok());
+    let choice = choose(&search, &mut view1, &mut view2, None)?;
+    let mut result = Settled::of(&search, choice, rig, &view1, &view2);
+    let corrected = result.calibration.as_ref().and_then(|found| found.correct(rig).ok());
     if let Some(corrected) = &corrected {
         search.rig = corrected;
-        choice = choose(&search, &mut view1, &mut view2, None)?;
+        let choice = choose(&search, &mut view1, &mut view2, None)?;
+        result = Settled::of(&search, choice, rig, &view1, &view2);
     }
-    let mut result = Settled::of(&search, choice, rig, &view1, &view2);
     let again = match params.second_look {
         SecondLook::Never => false,
         SecondLook::InDoubt => !suspicions(&result.evidence).is_empty(),
@@ -148,14 +145,14 @@ pub(crate) fn reconstruct_masks(
         let choice = choose(&search, &mut view1, &mut view2, Some(result.choice))?;
         result = Settled::of(&search, choice, rig, &view1, &view2);
     }
-    let Settled { choice: Choice { best, rivals, margin, fits, .. }, fit, calibration, evidence } =
-        result;
+    let Settled { choice, mut fits, margin, calibration, evidence } = result;
+    let rivals = &choice.finalists[fits.len()..];
+    let candidates = fits.iter().chain(rivals).map(Candidate::considered).collect();
+    let best = fits.swap_remove(0);
     let [i, j] = best.walks;
     let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
-    let explanation = Explanation {
-        candidates: std::iter::once(&fit).chain(&rivals).map(Candidate::considered).collect(),
-        junctions: [view1.junctions(i), view2.junctions(j)],
-    };
+    let explanation =
+        Explanation { candidates, junctions: [view1.junctions(i), view2.junctions(j)] };
     Ok(JointResult {
         explanation,
         walk1: view1.walks[i].points.clone(),
@@ -163,60 +160,65 @@ pub(crate) fn reconstruct_masks(
         coverage,
         mean_distance_px: best.mean_distance_px,
         margin,
-        fits,
+        fits: choice.fits,
         calibration,
         suspicions: suspicions(&evidence),
         evidence,
-        fit: fit.fit,
+        fit: best.fit,
     })
 }
 
-/// A choice with its last, adaptive fit.
+/// A choice with the last, adaptive fits.
 struct Settled {
     choice: Choice,
-    /// The best with that fit, if there was one.
-    fit: Candidate,
+    /// Of the finalists that are close, the likeliest first, as in `choice`.
+    fits: Vec<Candidate>,
+    margin: f64,
     calibration: Option<CalibrationEstimate>,
     evidence: Evidence,
 }
 
 impl Settled {
+    /// The likeliest of the finalists that are close, each fitted adaptively: a score weighs all bends
+    /// alike, but one more bend says little of a wire that bends everywhere and much of a straight one.
     /// `given_rig` is the one that the calibration's correction is relative to.
     fn of(
         search: &Search<'_>,
-        choice: Choice,
+        mut choice: Choice,
         given_rig: &Rig,
         view1: &ViewCandidates<View1>,
         view2: &ViewCandidates<View2>,
     ) -> Self {
-        let best = &choice.best;
-        let mut calibration = None;
-        let fit = match &search.params.calibration {
-            Some(priors) => search.calibrated(best, given_rig, priors).map(|last| {
-                calibration = Some(last.calibration);
-                last.fit
-            }),
-            None => {
-                let (start, settings) = (&best.fit.curve, &best.settings);
-                let adaptive = AdaptiveParams::DEFAULT;
-                fit_outlines_adaptively(start, search.outlines, given_rig, settings, &adaptive).ok()
-            }
-        };
-        let fit = fit.map_or_else(|| best.clone(), |fit| best.refitted(fit, given_rig));
-        let [i, j] = best.walks;
+        let least = choice.finalists[0].score;
+        let contenders = choice.finalists.iter().take_while(|c| c.score <= least + CONTENDER);
+        let (mut fits, mut calibrations): (Vec<_>, Vec<_>) =
+            contenders.map(|c| search.last_fit(c, given_rig)).unzip();
+        let first = (0..fits.len())
+            .min_by(|&a, &b| fits[a].unlikeliness().total_cmp(&fits[b].unlikeliness()))
+            .unwrap_or(0);
+        choice.finalists.swap(0, first);
+        fits.swap(0, first);
+        let (fit, rivals) = (&fits[0], &fits[1..]);
+        let close = rivals.iter().map(|rival| (rival.unlikeliness() - fit.unlikeliness(), rival));
+        let far = choice.finalists[fits.len()..].iter();
+        let far = far.map(|rival| (rival.score - least, rival));
+        let margin = close
+            .chain(far)
+            .filter(|(_, rival)| !rival.shape.is_like(&fit.shape, RIVAL_PX))
+            .map(|(behind, _)| behind)
+            .fold(f64::INFINITY, f64::min);
+        let [i, j] = fit.walks;
         let mut walks = Walks::default();
         walks.add(&view1.walks, i, view1.cut_ends(i).len() / 2);
         walks.add(&view2.walks, j, view2.cut_ends(j).len() / 2);
-        let evidence = Evidence::new(&fit, &best.shape, choice.margin, &walks, given_rig);
-        Self { choice, fit, calibration, evidence }
+        let evidence = Evidence::new(fit, &choice.finalists[0].shape, margin, &walks, given_rig);
+        Self { fits, margin, calibration: calibrations.swap_remove(first), evidence, choice }
     }
 }
 
 struct Choice {
-    best: Candidate,
-    /// The other finalists, best first.
-    rivals: Vec<Candidate>,
-    margin: f64,
+    /// Different curves, the best first; at least one.
+    finalists: Vec<Candidate>,
     fits: usize,
     tried: Vec<Tried>,
 }
@@ -231,8 +233,7 @@ fn choose(
     let params = search.params;
     let (mut found, mut tried, mut fits) = (Vec::new(), Vec::new(), 0);
     if let Some(earlier) = earlier {
-        found.push(earlier.best);
-        found.extend(earlier.rivals);
+        found.extend(earlier.finalists);
         (tried, fits) = (earlier.tried, earlier.fits);
     }
     let before = found.len();
@@ -264,16 +265,11 @@ fn choose(
             finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
         }
     }
-    let Some(best) = finalists.first().cloned() else {
+    if finalists.is_empty() {
         let walks = [view1.walks.len(), view2.walks.len()];
         return Err(Error::NoCandidate { case: search.case.to_owned(), walks, pairs });
-    };
-    let margin = finalists
-        .iter()
-        .find(|rival| !rival.shape.is_like(&best.shape, RIVAL_PX))
-        .map_or(f64::INFINITY, |rival| rival.score - best.score);
-    let rivals = finalists.split_off(1);
-    Ok(Choice { best, rivals, margin, fits, tried })
+    }
+    Ok(Choice { finalists, fits, tried })
 }
 
 /// The bridges twice as wide as they come: what hides the body hides how it bends there.

@@ -19,6 +19,8 @@ const STRAY_SHARE: f64 = 0.1;
 /// outlines, the less bent one is right more often: the other bends to serve the noise.
 const MISFIT: f64 = 2.0;
 const BENDING: f64 = 10.0;
+/// -2 ln of a probability for half a squared px: a residual has the variance 3/18 px² then.
+const SURPRISE_PER_SCORE: f64 = 12.0;
 /// What a boundary point costs that the curve does not use, px²: what it would cost at the truth, so
 /// that losing points is no gain.
 const UNUSED_PX2: f64 = 1.0 / 18.0;
@@ -129,6 +131,7 @@ impl Candidate {
             walks: self.walks,
             reversed: self.reversed,
             score: self.score,
+            unlikeliness: self.fit.surprise.map(|_| self.unlikeliness()),
             unexplained: self.misfit - judgement.outside,
             outside: judgement.outside,
             chi_per_point: judgement.chi_per_point(),
@@ -146,6 +149,14 @@ impl Candidate {
             + 0.5 * (judgement.chi + UNUSED_PX2 * unused)
             + BENDING * bending(&self.fit.curve, rig)
             + self.prior;
+    }
+
+    /// How much less likely than others it is, on the scale of a score: by [`OutlineFit::surprise`]
+    /// where the fit was adaptive.
+    pub(crate) fn unlikeliness(&self) -> f64 {
+        self.fit.surprise.map_or(f64::INFINITY, |surprise| surprise / SURPRISE_PER_SCORE)
+            + MISFIT * self.misfit
+            + self.prior
     }
 
     /// Whether nothing speaks against it.

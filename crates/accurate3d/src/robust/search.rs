@@ -1,6 +1,6 @@
 use accurate_fit::{
-    AdaptiveParams, CalibratedFit, CalibrationPriors, OutlineFit, OutlineFitParams, OutlinePair,
-    fit_outlines, fit_outlines_and_calibration,
+    AdaptiveParams, CalibrationEstimate, OutlineFit, OutlineFitParams, OutlinePair, fit_outlines,
+    fit_outlines_adaptively, fit_outlines_and_calibration,
 };
 use accurate_geom::{Curve3, EpipolarAngle, Pixel, Rig, View, View1, View2};
 use accurate_match::{FreeEnds, Proposal, ProposeParams, propose_pairs};
@@ -229,24 +229,27 @@ impl Search<'_> {
         more
     }
 
-    /// The adaptive fit with the calibration of view 2 among the unknowns.
-    pub(crate) fn calibrated(
+    /// The candidate with its last, adaptive fit under the given cameras, and what that says about the
+    /// calibration if it is among the unknowns; as it is if there is no such fit.
+    pub(crate) fn last_fit(
         &self,
         candidate: &Candidate,
         given_rig: &Rig,
-        priors: &CalibrationPriors,
-    ) -> Option<CalibratedFit> {
+    ) -> (Candidate, Option<CalibrationEstimate>) {
         let (start, settings) = (&candidate.fit.curve, &candidate.settings);
-        let adaptive = AdaptiveParams::DEFAULT;
-        let found = fit_outlines_and_calibration(
-            start,
-            self.outlines,
-            given_rig,
-            settings,
-            &adaptive,
-            priors,
-        );
-        found.ok()
+        let (outlines, adaptive) = (self.outlines, AdaptiveParams::DEFAULT);
+        let found = match &self.params.calibration {
+            Some(priors) => fit_outlines_and_calibration(
+                start, outlines, given_rig, settings, &adaptive, priors,
+            )
+            .map(|found| (found.fit, Some(found.calibration))),
+            None => fit_outlines_adaptively(start, outlines, given_rig, settings, &adaptive)
+                .map(|fit| (fit, None)),
+        };
+        found.map_or_else(
+            |_| (candidate.clone(), None),
+            |(fit, calibration)| (candidate.refitted(fit, given_rig), calibration),
+        )
     }
 
     pub(crate) fn fit(&self, start: &Curve3, params: &OutlineFitParams) -> Option<OutlineFit> {
