@@ -101,10 +101,33 @@ pub fn read_mask(path: &Path) -> Result<Array2<bool>, IoError> {
     }
     let (width, height) = image.dimensions();
     let shape = (height as usize, width as usize);
-    // 16 bit per channel keeps a value of 1 in 65535, which 8 bit would round to background.
-    let rgb = image.into_rgb16().into_raw();
-    let values = rgb.chunks_exact(3).map(|p| p.iter().any(|&v| v != 0)).collect();
-    to_array(path, shape, values)
+    to_array(path, shape, foreground(&image))
+}
+
+/// Whether a channel other than alpha is not zero, for every pixel.
+///
+/// As stored: a conversion of colours would take most of the time of a whole reconstruction, and one
+/// to 8 bits would round a value of 1 in 65535 to background.
+fn foreground(image: &DynamicImage) -> Vec<bool> {
+    match image {
+        DynamicImage::ImageLuma8(image) => any_of::<_, 1>(image, 1),
+        DynamicImage::ImageLumaA8(image) => any_of::<_, 2>(image, 1),
+        DynamicImage::ImageRgb8(image) => any_of::<_, 3>(image, 3),
+        DynamicImage::ImageRgba8(image) => any_of::<_, 4>(image, 3),
+        DynamicImage::ImageLuma16(image) => any_of::<_, 1>(image, 1),
+        DynamicImage::ImageLumaA16(image) => any_of::<_, 2>(image, 1),
+        DynamicImage::ImageRgb16(image) => any_of::<_, 3>(image, 3),
+        DynamicImage::ImageRgba16(image) => any_of::<_, 4>(image, 3),
+        // Floats: what is too little for 16 bits is background.
+        other => any_of::<_, 3>(&other.to_rgb16(), 3),
+    }
+}
+
+/// Whether one of the first `colours` of the `N` channels of a pixel is not zero, for every pixel.
+fn any_of<T: Default + PartialEq, const N: usize>(channels: &[T], colours: usize) -> Vec<bool> {
+    let zero = T::default();
+    let (pixels, _) = channels.as_chunks::<N>();
+    pixels.iter().map(|pixel| pixel[..colours].iter().any(|value| *value != zero)).collect()
 }
 
 /// The size of an image file, from its header.
@@ -317,6 +340,7 @@ fn to_array<T>(path: &Path, shape: (usize, usize), values: Vec<T>) -> Result<Arr
 mod tests {
     use super::*;
     use image::{Luma, Rgb, RgbImage, RgbaImage};
+    use proptest::prelude::*;
     use std::fs;
 
     fn save(image: &DynamicImage, format: ImageFormat) -> (tempfile::TempDir, std::path::PathBuf) {
@@ -341,6 +365,51 @@ mod tests {
         let white = RgbImage::from_pixel(2, 2, Rgb([255, 255, 255]));
         let (_folder, path) = save(&white.into(), ImageFormat::Bmp);
         assert!(read_grey(&path).unwrap().values.iter().all(|&v| v == 255.0));
+    }
+
+    /// An image of every type that the decoders give, its channels taken from `values` in turn.
+    fn images(width: u32, height: u32, values: &[u16]) -> Vec<DynamicImage> {
+        fn image<P: image::Pixel>(
+            (width, height): (u32, u32),
+            values: &[u16],
+            channel: impl Fn(u16) -> P::Subpixel,
+        ) -> ImageBuffer<P, Vec<P::Subpixel>> {
+            let count = width as usize * height as usize * usize::from(P::CHANNEL_COUNT);
+            let channels = values.iter().cycle().take(count).map(|&v| channel(v)).collect();
+            ImageBuffer::from_raw(width, height, channels).unwrap()
+        }
+        let size = (width, height);
+        // The low byte: small values stay small.
+        let byte = |v: u16| v as u8;
+        let float = |v: u16| f32::from(v) / 65_535.0;
+        vec![
+            DynamicImage::ImageLuma8(image(size, values, byte)),
+            DynamicImage::ImageLumaA8(image(size, values, byte)),
+            DynamicImage::ImageRgb8(image(size, values, byte)),
+            DynamicImage::ImageRgba8(image(size, values, byte)),
+            DynamicImage::ImageLuma16(image(size, values, |v| v)),
+            DynamicImage::ImageLumaA16(image(size, values, |v| v)),
+            DynamicImage::ImageRgb16(image(size, values, |v| v)),
+            DynamicImage::ImageRgba16(image(size, values, |v| v)),
+            DynamicImage::ImageRgb32F(image(size, values, float)),
+            DynamicImage::ImageRgba32F(image(size, values, float)),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn foreground_is_what_is_not_black_in_16_bits_of_red_green_and_blue(
+            width in 1..6_u32, height in 1..6_u32,
+            // Mostly 0, then 1, which 8 bits would lose.
+            values in prop::collection::vec(
+                prop_oneof![4 => Just(0_u16), 1 => Just(1), 1 => any::<u16>()], 1..40),
+        ) {
+            for image in images(width, height, &values) {
+                let rgb = image.to_rgb16();
+                let expected: Vec<bool> = rgb.pixels().map(|p| p.0 != [0; 3]).collect();
+                prop_assert_eq!(foreground(&image), expected, "{:?}", image.color());
+            }
+        }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-use accurate_geom::{GeomError, Pixel, Rig, Triangulation, Triangulator, View1, View2};
+use accurate_geom::{GeomError, Pixel, Point3, Rig, Triangulation, Triangulator, View1, View2};
 
 use crate::ray_image::RayImager;
 use crate::{CurvePoint, CurveReconstruction, MatchError};
@@ -29,7 +29,7 @@ pub struct PixelPair {
 /// results use [`Triangulation::Dlt`].
 ///
 /// # Cost
-/// O(number of pairs); see [`Triangulator::triangulate`].
+/// O(number of pairs); see [`Triangulator::triangulate_all`].
 pub fn triangulate_pairs(
     method: &'static str,
     rig: &Rig,
@@ -41,8 +41,9 @@ pub fn triangulate_pairs(
     let mut points = Vec::with_capacity(pairs.len());
     let mut cells = Vec::with_capacity(pairs.len());
     let mut first_failure = None;
-    for pair in pairs {
-        match curve_point(rig, &triangulator, &imager, pair) {
+    let positions = triangulator.triangulate_all(pairs.iter().map(|p| (p.pixel1, p.pixel2)));
+    for (pair, position) in pairs.iter().zip(positions) {
+        match position.and_then(|position| curve_point(rig, &imager, pair, position)) {
             Ok(point) => {
                 points.push(point);
                 cells.push(pair.cell);
@@ -64,12 +65,11 @@ pub fn triangulate_pairs(
 
 fn curve_point(
     rig: &Rig,
-    triangulator: &Triangulator,
     imager: &RayImager<View1, View2>,
     pair: &PixelPair,
+    position: Point3,
 ) -> Result<CurvePoint, GeomError> {
     let PixelPair { pixel1, pixel2, .. } = *pair;
-    let position = triangulator.triangulate(pixel1, pixel2)?;
     for camera in [rig.camera1(), rig.camera2()] {
         let depth = camera.depth(&position);
         if depth <= 0.0 {
