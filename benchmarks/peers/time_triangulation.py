@@ -33,9 +33,16 @@ def main():
             squares += ((h[:, :2] / h[:, 2:] - x) ** 2).sum(axis=1)
         return np.sqrt(squares.mean() / 4)
 
-    errors = {name: reprojection(ours.answer(name)) for name in ("lindstrom", "dlt", "midpoint")}
+    methods = ("lindstrom", "dlt", "midpoint")
+    errors = {name: reprojection(ours.answer(name)) for name in methods}
     require("Lindstrom reprojects best", errors["lindstrom"] <= min(errors.values()))
+    for name in methods:
+        same = np.array_equal(ours.answer(name), ours.answer(f"{name}_into"))
+        require(f"{name} into the caller's lists", same)
 
+    # Both ways to call each side: the answer in memory that the call asks for, or in the caller's.
+    mine = np.empty_like(homogeneous)
+    require("OpenCV writes where it is told", cv2.triangulatePoints(p1, p2, *columns, mine) is mine)
     times = in_turns(
         {
             "accurate Lindstrom": ours.timed("lindstrom"),
@@ -44,13 +51,22 @@ def main():
             "OpenCV triangulatePoints (DLT)": wall(
                 lambda: cv2.triangulatePoints(p1, p2, *columns)
             ),
+            "accurate Lindstrom, memory used again": ours.timed("lindstrom_into"),
+            "accurate DLT, memory used again": ours.timed("dlt_into"),
+            "accurate midpoint, memory used again": ours.timed("midpoint_into"),
+            "OpenCV triangulatePoints (DLT), memory used again": wall(
+                lambda: cv2.triangulatePoints(p1, p2, *columns, mine)
+            ),
         },
         rounds,
     )
-    peer = "OpenCV triangulatePoints (DLT)"
     peers = [
-        (peer, "accurate Lindstrom", "ours is the least reprojection error"),
-        (peer, "accurate DLT", "the same least squares"),
+        (f"OpenCV triangulatePoints (DLT){memory}", f"accurate {method}{memory}", note)
+        for memory in ("", ", memory used again")
+        for method, note in (
+            ("Lindstrom", "ours is the least reprojection error"),
+            ("DLT", "the same least squares"),
+        )
     ]
     packages = ["opencv-contrib-python-headless"]
     result = record("triangulation", f"{len(x1)} pairs", times, peers, packages)

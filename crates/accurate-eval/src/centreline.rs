@@ -47,14 +47,9 @@ pub fn centreline_distance(
 /// Mean and largest distance of the vertices of `from` to `to`.
 fn directed(from: &[Vec<[f64; 2]>], to: &[Vec<[f64; 2]>]) -> (f64, f64) {
     let index = PolylineIndex::of_pieces(to.iter().map(Vec::as_slice));
-    let (mut sum, mut max, mut count) = (0.0, 0.0_f64, 0_usize);
-    for vertex in from.iter().flatten() {
-        let distance = index.distance(*vertex);
-        sum += distance;
-        max = max.max(distance);
-        count += 1;
-    }
-    (sum / count as f64, max)
+    let distances = index.distances(&from.concat());
+    let sum: f64 = distances.iter().sum();
+    (sum / distances.len() as f64, distances.iter().copied().fold(0.0, f64::max))
 }
 
 fn checked(which: &'static str, pieces: &[Vec<Point2>]) -> Result<Vec<Vec<[f64; 2]>>, EvalError> {

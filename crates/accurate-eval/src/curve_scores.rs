@@ -2,7 +2,7 @@ use accurate_geom::Point3;
 
 use crate::EvalError;
 use crate::frechet::coupling_distance;
-use crate::nearest::PolylineIndex;
+use crate::nearest::{PolylineIndex, coordinates};
 use crate::quantile::sorted_quantile;
 use crate::resample::{check_spacing, length, resample};
 
@@ -93,9 +93,7 @@ pub fn curve_scores(
 
 /// Distances of points to a polyline, ascending.
 fn sorted_distances(from: &[Point3], polyline: &[Point3]) -> Vec<f64> {
-    let vertices: Vec<[f64; 3]> = polyline.iter().map(|p| p.coords.into()).collect();
-    let index = PolylineIndex::new(&vertices);
-    let mut distances: Vec<f64> = from.iter().map(|p| index.distance(p.coords.into())).collect();
+    let mut distances = PolylineIndex::new(&coordinates(polyline)).distances(&coordinates(from));
     distances.sort_by(f64::total_cmp);
     distances
 }

@@ -116,7 +116,7 @@ pub fn skeleton_agreement(
         // Squared distances of pixels are integers: a tolerance of sqrt(2) means diagonal
         // neighbours, whatever its last bit.
         let limit = tolerance_px * (1.0 + 4.0 * f64::EPSILON);
-        let hits = from.iter().filter(|p| index.distance(**p) <= limit).count();
+        let hits = index.distances(from).into_iter().filter(|&d| d <= limit).count();
         hits as f64 / from.len() as f64
     };
     Ok(SkeletonAgreement { recall: near(&truth, &found), precision: near(&found, &truth) })

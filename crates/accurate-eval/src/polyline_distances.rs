@@ -1,6 +1,6 @@
 use accurate_geom::Point3;
 
-use crate::nearest::PolylineIndex;
+use crate::nearest::{PolylineIndex, coordinates};
 use crate::{EvalError, check};
 
 /// Distance of every point to the nearest place of a polyline, vertices and segments alike, in the
@@ -10,14 +10,12 @@ use crate::{EvalError, check};
 /// [`EvalError::Empty`], [`EvalError::NotFinite`] or [`EvalError::TooLarge`], naming the list.
 ///
 /// # Cost
-/// O((n + m) log m) for n points that run along a curve and m vertices: a search starts at the
-/// segment that was nearest to the point before. O(n m) at worst.
+/// O((n + m) log m) for n points that run along a curve and m vertices: as many as a vector of the
+/// machine holds are searched for together, starting where the last were found. O(n m) at worst.
 pub fn polyline_distances(points: &[Point3], polyline: &[Point3]) -> Result<Vec<f64>, EvalError> {
     check::points("points", points)?;
     check::points("polyline", polyline)?;
-    let vertices: Vec<[f64; 3]> = polyline.iter().map(|p| p.coords.into()).collect();
-    let index = PolylineIndex::new(&vertices);
-    Ok(points.iter().map(|p| index.distance(p.coords.into())).collect())
+    Ok(PolylineIndex::new(&coordinates(polyline)).distances(&coordinates(points)))
 }
 
 #[cfg(test)]

@@ -39,7 +39,7 @@ pub fn reprojection_rms(
 fn rms_px(samples: &[Point3], truth: &[Point3], camera: &Camera) -> Result<f64, EvalError> {
     let line = PolylineIndex::new(&project("truth", truth, camera)?);
     let image = project("reconstruction", samples, camera)?;
-    let sum: f64 = image.iter().map(|&pixel| line.distance(pixel).powi(2)).sum();
+    let sum: f64 = line.distances(&image).into_iter().map(|distance| distance.powi(2)).sum();
     Ok((sum / image.len() as f64).sqrt())
 }
 

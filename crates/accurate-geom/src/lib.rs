@@ -45,7 +45,7 @@ pub use nalgebra;
 pub use pixel::{Pixel, View, View1, View2};
 pub use polyline::{ClosestOnPolyline, Polyline, Polyline2, Polyline3};
 pub use rig::Rig;
-pub use triangulate::{Triangulation, Triangulator, UnknownTriangulation};
+pub use triangulate::{Triangulated, Triangulation, Triangulator, UnknownTriangulation};
 pub use unit::{LengthUnit, UnknownUnit};
 
 /// A point of an image plane, in px.

@@ -41,9 +41,10 @@ pub fn triangulate_pairs(
     let mut points = Vec::with_capacity(pairs.len());
     let mut cells = Vec::with_capacity(pairs.len());
     let mut first_failure = None;
-    let positions = triangulator.triangulate_all(pairs.iter().map(|p| (p.pixel1, p.pixel2)));
-    for (pair, position) in pairs.iter().zip(positions) {
-        match position.and_then(|position| curve_point(rig, &imager, pair, position)) {
+    let found = triangulator.triangulate_all(pairs.iter().map(|p| (p.pixel1, p.pixel2)));
+    for (pair, position) in pairs.iter().zip(found.results()) {
+        let point = position.map_err(GeomError::clone);
+        match point.and_then(|position| curve_point(rig, &imager, pair, position)) {
             Ok(point) => {
                 points.push(point);
                 cells.push(pair.cell);

@@ -5,15 +5,17 @@
 //! nanoseconds, those of the processor and those on the wall; FILE.npy gets the answer, for the peer to compare with its own.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::io::{BufRead, Write};
 use std::path::Path;
 use std::process::ExitCode;
+use std::rc::Rc;
 use std::time::Instant;
 
 use accurate_eval::{TableScores, polyline_distances, table_scores};
-use accurate_geom::{GeomError, Pixel, Point3, Triangulation, Triangulator, View, View1, View2};
+use accurate_geom::{Pixel, Point3, Triangulated, Triangulation, Triangulator, View, View1, View2};
 use accurate_match::{Alignment, CostModel, DistanceKind, TieOrder, align_curves};
 use accurate_seg::{Mask, guo_hall, zhang_suen};
 use accurate_speed::{Wire, wire_mask};
@@ -164,13 +166,21 @@ fn triangulation(folder: &Path) -> Result<BTreeMap<String, Job>, Failure> {
         let triangulator = Triangulator::new(wire.rig(), method);
         let one: Vec<Pixel<View1>> = pixels(&load(folder, "pairs_1.npy")?);
         let two: Vec<Pixel<View2>> = pixels(&load(folder, "pairs_2.npy")?);
-        let run =
-            move || Ok(triangulator.triangulate_all(one.iter().copied().zip(two.iter().copied())));
-        let answer = |found: Vec<Result<Point3, GeomError>>| {
-            let points = found.into_iter().collect::<Result<Vec<_>, _>>()?;
-            Ok(rows(points.iter().map(|p| [p.x, p.y, p.z])))
+        let pairs: Vec<_> = one.into_iter().zip(two).collect();
+        let answer = |found: &Triangulated| match found.failures.first() {
+            Some((index, failure)) => Err(format!("pair {index}: {failure}").into()),
+            None => Ok(rows(found.points.iter().map(|p| [p.x, p.y, p.z]))),
         };
-        jobs.insert(method.to_string(), job(run, answer));
+        // Into memory that the call asks for, and into lists that it finds.
+        let (fresh, again) = (triangulator.clone(), Rc::new(RefCell::new(Triangulated::default())));
+        let (of_fresh, found) = (pairs.clone(), Rc::clone(&again));
+        let run = move || Ok(fresh.triangulate_all(of_fresh.iter().copied()));
+        jobs.insert(method.to_string(), job(run, move |found| answer(&found)));
+        let run = move || {
+            triangulator.triangulate_into(pairs.iter().copied(), &mut again.borrow_mut());
+            Ok(())
+        };
+        jobs.insert(format!("{method}_into"), job(run, move |()| answer(&found.borrow())));
     }
     Ok(jobs)
 }

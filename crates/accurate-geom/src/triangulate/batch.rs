@@ -2,11 +2,11 @@ use std::marker::PhantomData;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::Triangulator;
 use super::method::Method;
 use super::number::Vector;
 use super::two_view::TwoView;
-use crate::{GeomError, Pixel, Point3, View1, View2};
+use super::{Triangulated, Triangulator};
+use crate::{Pixel, Point3, View1, View2};
 
 /// Pairs that go through the kernel at once: a multiple of every vector, small enough for the
 /// nearest cache.
@@ -22,12 +22,13 @@ type Points = [[f64; CHUNK]; 4];
 pub(super) fn run<M: Method, I: Iterator<Item = (Pixel<View1>, Pixel<View2>)>>(
     triangulator: &Triangulator,
     mut pairs: I,
-) -> Vec<Result<Point3, GeomError>> {
+    found: &mut Triangulated,
+) {
     let machine = Arch::new();
     let geometry = &triangulator.geometry;
-    let mut results = Vec::with_capacity(pairs.size_hint().0);
     let mut pixels = [[0.0; CHUNK]; 4];
     let mut points = [[0.0; CHUNK]; 4];
+    let mut done = 0;
     loop {
         let mut count = 0;
         for (p1, p2) in pairs.by_ref().take(CHUNK) {
@@ -44,18 +45,25 @@ pub(super) fn run<M: Method, I: Iterator<Item = (Pixel<View1>, Pixel<View2>)>>(
             method: PhantomData,
         });
         let [x, y, z, fine] = &points;
-        for k in 0..count {
-            results.push(if fine[k] > 0.0 {
-                Ok(Point3::new(x[k], y[k], z[k]))
-            } else {
+        let point = |k: usize| Point3::new(x[k], y[k], z[k]);
+        // NaN is not fine either.
+        if fine[..count].iter().all(|&fine| fine > 0.0) {
+            found.points.extend((0..count).map(point));
+        } else {
+            for k in 0..count {
                 let p1 = Pixel::new(pixels[0][k], pixels[1][k]);
                 let p2 = Pixel::new(pixels[2][k], pixels[3][k]);
-                triangulator.triangulate(p1, p2)
-            });
+                let fine = fine[k] > 0.0;
+                found.push(
+                    done + k,
+                    if fine { Ok(point(k)) } else { triangulator.triangulate(p1, p2) },
+                );
+            }
         }
         if count < CHUNK {
-            return results;
+            return;
         }
+        done += count;
     }
 }
 

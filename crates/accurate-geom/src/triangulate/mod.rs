@@ -128,21 +128,72 @@ impl Triangulator {
         solution.checked(g, p1, p2)
     }
 
-    /// What [`triangulate`](Self::triangulate) gives for each pair, in their order, bit by bit.
+    /// What [`triangulate`](Self::triangulate) gives for each pair, bit by bit.
     ///
     /// # Cost
     /// O(number of pairs). As many pairs at once as the machine's vectors hold (AVX-512, AVX2, else
-    /// one by one): with 8, about 10 ns a pair for midpoint, 15 for Lindstrom and 30 for DLT.
+    /// one by one): with 8, about 10 ns a pair for midpoint, 15 for Lindstrom and 20 for DLT, and as
+    /// much again for writing to memory fresh from the system, which
+    /// [`triangulate_into`](Self::triangulate_into) avoids.
     pub fn triangulate_all(
         &self,
         pairs: impl IntoIterator<Item = (Pixel<View1>, Pixel<View2>)>,
-    ) -> Vec<Result<Point3, GeomError>> {
+    ) -> Triangulated {
+        let mut found = Triangulated::default();
+        self.triangulate_into(pairs, &mut found);
+        found
+    }
+
+    /// [`triangulate_all`](Self::triangulate_all) into lists that are used again: what was in
+    /// `found` is gone, its memory is kept.
+    pub fn triangulate_into(
+        &self,
+        pairs: impl IntoIterator<Item = (Pixel<View1>, Pixel<View2>)>,
+        found: &mut Triangulated,
+    ) {
         let pairs = pairs.into_iter();
+        found.points.clear();
+        found.failures.clear();
+        found.points.reserve(pairs.size_hint().0);
         match self.method {
-            Triangulation::Dlt => batch::run::<Dlt, _>(self, pairs),
-            Triangulation::Midpoint => batch::run::<Midpoint, _>(self, pairs),
-            Triangulation::LindstromNiter2 => batch::run::<LindstromNiter2, _>(self, pairs),
-            Triangulation::GaussNewton => pairs.map(|(p1, p2)| self.triangulate(p1, p2)).collect(),
+            Triangulation::Dlt => batch::run::<Dlt, _>(self, pairs, found),
+            Triangulation::Midpoint => batch::run::<Midpoint, _>(self, pairs, found),
+            Triangulation::LindstromNiter2 => batch::run::<LindstromNiter2, _>(self, pairs, found),
+            Triangulation::GaussNewton => {
+                for (index, (p1, p2)) in pairs.enumerate() {
+                    found.push(index, self.triangulate(p1, p2));
+                }
+            }
+        }
+    }
+}
+
+/// The points of many pairs, and the pairs that have none.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Triangulated {
+    /// The points of all pairs that have one, in the order of the pairs.
+    pub points: Vec<Point3>,
+    /// The other pairs: their indices, ascending, and what is wrong with each.
+    pub failures: Vec<(usize, GeomError)>,
+}
+
+impl Triangulated {
+    /// Each pair's point or failure, in the order of the pairs.
+    pub fn results(&self) -> impl Iterator<Item = Result<Point3, &GeomError>> {
+        let mut points = self.points.iter();
+        let mut failures = self.failures.iter().peekable();
+        (0..self.points.len() + self.failures.len()).map_while(move |index| {
+            match failures.next_if(|(failed, _)| *failed == index) {
+                Some((_, failure)) => Some(Err(failure)),
+                None => points.next().copied().map(Ok),
+            }
+        })
+    }
+
+    fn push(&mut self, index: usize, result: Result<Point3, GeomError>) {
+        match result {
+            Ok(point) => self.points.push(point),
+            Err(failure) => self.failures.push((index, failure)),
         }
     }
 }

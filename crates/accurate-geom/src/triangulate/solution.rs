@@ -29,7 +29,7 @@ impl<N: Number> Solution<N> {
         // All above 0, or something may be wrong; NaN is not.
         for margin in [
             self.open.all(f64::MIN_POSITIVE) - self.open,
-            g.parallax(p1, p2).beyond(least),
+            g.meet_beyond(p1, p2, least),
             self.parallax.beyond(least),
             distance1_2 - zero.all(4.0 * least * least),
             distance2_2 - zero.all(4.0 * least * least),

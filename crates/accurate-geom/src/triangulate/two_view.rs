@@ -97,6 +97,15 @@ impl TwoView {
         (scaled(both * largest2, &ray1), scaled(both * largest1, &ray2))
     }
 
+    /// Above 0 where the rays of two pixels meet at an angle whose sine is clearly above `least`;
+    /// not so, or NaN, if squares of a ray overflow. [`Self::parallax`] tells more and divides.
+    #[inline(always)]
+    pub fn meet_beyond<N: Number>(&self, p1: &[N; 2], p2: &[N; 2], least: f64) -> N {
+        // A ray is at least 1 long: nothing underflows.
+        let (d1, d2) = (self.view1.ray(p1), self.view2.ray(p2));
+        Parallax::between(&d1, &d2, &cross(&d1, &d2)).beyond(least)
+    }
+
     /// The angle between the rays of two pixels; NaN where a ray overflows.
     #[inline(always)]
     pub fn parallax<N: Number>(&self, p1: &[N; 2], p2: &[N; 2]) -> Parallax<N> {
