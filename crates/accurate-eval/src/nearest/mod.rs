@@ -14,8 +14,9 @@ pub(crate) struct PointIndex {
 
 impl PointIndex {
     /// `points` is not empty and finite.
-    pub(crate) fn new(points: impl Iterator<Item = [f64; 3]>) -> Self {
-        Self { tree: Tree::new(points.map(|point| (point, Aabb::of_point(point)))) }
+    pub(crate) fn new(points: impl ExactSizeIterator<Item = [f64; 3]>) -> Self {
+        let count = points.len();
+        Self { tree: Tree::new(count, points.map(|point| (point, Aabb::of_point(point)))) }
     }
 
     /// The distance of every query to the nearest point, in their order.
@@ -38,15 +39,16 @@ impl<const N: usize> PolylineIndex<N> {
     }
 
     /// All of several polylines.
-    pub(crate) fn of_pieces<'a>(pieces: impl Iterator<Item = &'a [[f64; N]]>) -> Self {
+    pub(crate) fn of_pieces<'a>(pieces: impl Iterator<Item = &'a [[f64; N]]> + Clone) -> Self {
+        let count = pieces.clone().map(<[_]>::len).sum();
+        let edge = |from: [f64; N], to: [f64; N]| {
+            (Edge::new(from, to), Aabb::of_point(from).joined(Aabb::of_point(to)))
+        };
         let edges = pieces.flat_map(|vertices| {
-            let next = vertices.iter().skip(1).chain(vertices.last());
-            vertices
-                .iter()
-                .zip(next)
-                .map(|(&from, &to)| (Edge::new(from, to), Aabb::of_edge(from, to)))
+            let between = vertices.windows(2).map(move |pair| edge(pair[0], pair[1]));
+            between.chain(vertices.last().map(|&last| edge(last, last)))
         });
-        Self { tree: Tree::new(edges) }
+        Self { tree: Tree::new(count, edges) }
     }
 
     /// The distance of every query to the nearest point of the polylines, in their order.

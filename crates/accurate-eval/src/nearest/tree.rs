@@ -12,7 +12,7 @@ const MOST_LANES: usize = 8;
 /// rounding could make the piece nearer than its box.
 ///
 /// With u = ε/2, an offset from a point inside an edge is wrong by 3u of itself at most, and by 5u of
-/// the edge, by which [`Aabb::of_edge`] is larger. Squares and their sums add 4u on either side, the
+/// the edge, by which [`Aabb::widened`] is larger. Squares and their sums add 4u on either side, the
 /// offset from the box u: 16u in all, taken twice. Distances to points need no allowance, each of
 /// their operations being monotone. (Squares that underflow, of distances below 1e-154, aside.)
 const ALLOWANCE: f64 = 1.0 - 16.0 * f64::EPSILON;
@@ -35,20 +35,23 @@ pub(super) struct Tree<const N: usize, T> {
 }
 
 impl<const N: usize, T: Piece<N>> Tree<N, T> {
-    /// At least one piece, each with a box around it.
-    pub(super) fn new(items: impl Iterator<Item = (T, Aabb<N>)>) -> Self {
-        let mut pieces = Vec::with_capacity(items.size_hint().0);
-        let mut of_leaves: Vec<Aabb<N>> = Vec::with_capacity(items.size_hint().0.div_ceil(LEAF));
-        for (piece, bounds) in items {
+    /// At least one piece, each with a box around it; about `count` of them.
+    pub(super) fn new(count: usize, items: impl Iterator<Item = (T, Aabb<N>)>) -> Self {
+        let mut pieces = Vec::with_capacity(count);
+        let mut of_leaves: Vec<Aabb<N>> = Vec::with_capacity(count.div_ceil(LEAF));
+        // Chains and nests of iterators run well from inside only.
+        items.for_each(|(piece, bounds)| {
             match of_leaves.last_mut() {
                 Some(last) if pieces.len() % LEAF != 0 => *last = last.joined(bounds),
                 _ => of_leaves.push(bounds),
             }
             pieces.push(piece);
-        }
+        });
         let leaves = of_leaves.len().next_power_of_two();
         let mut boxes = vec![Aabb::EMPTY; 2 * leaves];
-        boxes[leaves..leaves + of_leaves.len()].copy_from_slice(&of_leaves);
+        for (slot, bounds) in boxes[leaves..].iter_mut().zip(of_leaves) {
+            *slot = bounds.widened();
+        }
         for node in (1..leaves).rev() {
             boxes[node] = boxes[2 * node].joined(boxes[2 * node + 1]);
         }
@@ -163,21 +166,19 @@ impl<const N: usize> Aabb<N> {
         Self { low: point, high: point }
     }
 
-    /// Around the edge between two points, and so much larger that roundings of places inside the
-    /// edge stay within; see [`ALLOWANCE`].
-    pub(super) fn of_edge(from: [f64; N], to: [f64; N]) -> Self {
-        let mut bounds = Self::of_point(from).joined(Self::of_point(to));
+    /// So much larger that roundings of places inside edges stay within; see [`ALLOWANCE`].
+    fn widened(self) -> Self {
+        let mut wide = self;
         for k in 0..N {
-            let (low, high) = (bounds.low[k], bounds.high[k]);
-            let margin = 4.0 * f64::EPSILON * (high - low);
+            let margin = 4.0 * f64::EPSILON * (self.high[k] - self.low[k]);
             // A step further, for the rounding of the difference itself.
-            bounds.low[k] = (low - margin).next_down();
-            bounds.high[k] = (high + margin).next_up();
+            wide.low[k] = (self.low[k] - margin).next_down();
+            wide.high[k] = (self.high[k] + margin).next_up();
         }
-        bounds
+        wide
     }
 
-    fn joined(self, other: Self) -> Self {
+    pub(super) fn joined(self, other: Self) -> Self {
         // No number here is NaN; `f64::min` would look for it.
         let smaller = |a: f64, b: f64| if a < b { a } else { b };
         let larger = |a: f64, b: f64| if a > b { a } else { b };

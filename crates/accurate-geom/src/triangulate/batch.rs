@@ -3,12 +3,12 @@ use std::marker::PhantomData;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::method::Method;
-use super::number::Vector;
+use super::number::{Two, Vector};
 use super::two_view::TwoView;
 use super::{Triangulated, Triangulator};
 use crate::{Pixel, Point3, View1, View2};
 
-/// Pairs that go through the kernel at once: a multiple of every vector, small enough for the
+/// Pairs that go through the kernel at once: a multiple of two of every vector, small enough for the
 /// nearest cache.
 const CHUNK: usize = 64;
 
@@ -84,13 +84,18 @@ impl<M: Method> WithSimd for Chunk<'_, M> {
         let [x1, y1, x2, y2] = self.pixels;
         let (x1, y1) = (S::as_simd_f64s(x1).0, S::as_simd_f64s(y1).0);
         let (x2, y2) = (S::as_simd_f64s(x2).0, S::as_simd_f64s(y2).0);
-        for k in 0..self.count.div_ceil(S::F64_LANES) {
-            let p1 = [Vector { simd, lanes: x1[k] }, Vector { simd, lanes: y1[k] }];
-            let p2 = [Vector { simd, lanes: x2[k] }, Vector { simd, lanes: y2[k] }];
+        let two = |row: &[S::f64s], k: usize| {
+            Two(Vector { simd, lanes: row[k] }, Vector { simd, lanes: row[k + 1] })
+        };
+        for k in (0..self.count.div_ceil(S::F64_LANES)).step_by(2) {
+            let p1 = [two(x1, k), two(y1, k)];
+            let p2 = [two(x2, k), two(y2, k)];
             let ([x, y, z], fine) = M::solve(g, &p1, &p2).world(g, &p1, &p2);
             let numbers = [x, y, z, fine];
             for n in 0..numbers.len() {
-                S::as_mut_simd_f64s(&mut self.points[n]).0[k] = numbers[n].lanes;
+                let row = S::as_mut_simd_f64s(&mut self.points[n]).0;
+                row[k] = numbers[n].0.lanes;
+                row[k + 1] = numbers[n].1.lanes;
             }
         }
     }

@@ -137,6 +137,73 @@ impl<S: Simd> Number for Vector<S> {
     }
 }
 
+/// Two numbers in step: while one waits for a division, the other goes on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Two<N>(pub N, pub N);
+
+impl<N: Number> Add for Two<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0, self.1 + other.1)
+    }
+}
+
+impl<N: Number> Sub for Two<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(self.0 - other.0, self.1 - other.1)
+    }
+}
+
+impl<N: Number> Mul for Two<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(self.0 * other.0, self.1 * other.1)
+    }
+}
+
+impl<N: Number> Div for Two<N> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(self.0 / other.0, self.1 / other.1)
+    }
+}
+
+impl<N: Number> Number for Two<N> {
+    #[inline(always)]
+    fn all(self, value: f64) -> Self {
+        Self(self.0.all(value), self.1.all(value))
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt(), self.1.sqrt())
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        Self(self.0.larger(other.0), self.1.larger(other.1))
+    }
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        Self(self.0.smaller(other.0), self.1.smaller(other.1))
+    }
+    #[inline(always)]
+    fn if_positive(self, then: Self, otherwise: Self) -> Self {
+        Self(self.0.if_positive(then.0, otherwise.0), self.1.if_positive(then.1, otherwise.1))
+    }
+    #[inline(always)]
+    fn all_at_most(self, limit: f64) -> bool {
+        self.0.all_at_most(limit) && self.1.all_at_most(limit)
+    }
+}
+
 /// `a · b`.
 #[inline(always)]
 pub(super) fn dot<N: Number, const K: usize>(a: &[N; K], b: &[N; K]) -> N {
