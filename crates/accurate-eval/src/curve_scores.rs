@@ -2,7 +2,7 @@ use accurate_geom::Point3;
 
 use crate::EvalError;
 use crate::frechet::coupling_distance;
-use crate::nearest::{PolylineIndex, coordinates};
+use crate::nearest::PolylineIndex;
 use crate::quantile::sorted_quantile;
 use crate::resample::{check_spacing, length, resample};
 
@@ -93,7 +93,7 @@ pub fn curve_scores(
 
 /// Distances of points to a polyline, ascending.
 fn sorted_distances(from: &[Point3], polyline: &[Point3]) -> Vec<f64> {
-    let mut distances = PolylineIndex::new(&coordinates(polyline)).distances(&coordinates(from));
+    let mut distances = PolylineIndex::new(polyline).distances(from);
     distances.sort_by(f64::total_cmp);
     distances
 }

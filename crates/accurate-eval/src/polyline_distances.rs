@@ -1,6 +1,6 @@
 use accurate_geom::Point3;
 
-use crate::nearest::{PolylineIndex, coordinates};
+use crate::nearest::PolylineIndex;
 use crate::{EvalError, check};
 
 /// Distance of every point to the nearest place of a polyline, vertices and segments alike, in the
@@ -15,7 +15,7 @@ use crate::{EvalError, check};
 pub fn polyline_distances(points: &[Point3], polyline: &[Point3]) -> Result<Vec<f64>, EvalError> {
     check::points("points", points)?;
     check::points("polyline", polyline)?;
-    Ok(PolylineIndex::new(&coordinates(polyline)).distances(&coordinates(points)))
+    Ok(PolylineIndex::new(polyline).distances(points))
 }
 
 #[cfg(test)]

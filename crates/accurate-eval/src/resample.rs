@@ -78,9 +78,7 @@ mod tests {
             let step = length(&points) / (samples.len() - 1) as f64;
             prop_assert!(step <= spacing * (1.0 + 4.0 * f64::EPSILON));
             prop_assert!(step * samples.len() as f64 >= length(&points));
-            let vertices: Vec<[f64; 3]> = points.iter().map(|p| p.coords.into()).collect();
-            let line = crate::nearest::PolylineIndex::new(&vertices);
-            for distance in line.distances(&crate::nearest::coordinates(&samples)) {
+            for distance in crate::nearest::PolylineIndex::new(&points).distances(&samples) {
                 prop_assert!(distance <= 1e-13);
             }
             for pair in samples.windows(2) {

@@ -1,6 +1,6 @@
 use accurate_geom::Point3;
 
-use crate::nearest::{PointIndex, coordinates};
+use crate::nearest::PointIndex;
 use crate::{EvalError, check};
 
 /// The four numbers of the paper's Table 1, in the unit of the world.
@@ -60,8 +60,7 @@ fn nearest_distances(
 ) -> Result<(f64, f64), EvalError> {
     check::points(from.0, from.1)?;
     check::points(to.0, to.1)?;
-    let index = PointIndex::new(to.1.iter().map(|p| p.coords.into()));
-    let distances = index.distances(&coordinates(from.1));
+    let distances = PointIndex::new(to.1).distances(from.1);
     let sum: f64 = distances.iter().sum();
     Ok((sum / distances.len() as f64, distances.into_iter().fold(0.0, f64::max)))
 }

@@ -7,6 +7,23 @@ use pulp::Arch;
 use piece::Edge;
 use tree::{Aabb, Tree};
 
+/// What has coordinates.
+pub(crate) trait Place<const N: usize>: Copy {
+    fn coordinates(self) -> [f64; N];
+}
+
+impl<const N: usize> Place<N> for [f64; N] {
+    fn coordinates(self) -> [f64; N] {
+        self
+    }
+}
+
+impl Place<3> for Point3 {
+    fn coordinates(self) -> [f64; 3] {
+        self.coords.into()
+    }
+}
+
 /// Exact nearest distances to a set of points, fastest when points and queries run along a curve.
 pub(crate) struct PointIndex {
     tree: Tree<3, [f64; 3]>,
@@ -14,13 +31,13 @@ pub(crate) struct PointIndex {
 
 impl PointIndex {
     /// `points` is not empty and finite.
-    pub(crate) fn new(points: impl ExactSizeIterator<Item = [f64; 3]>) -> Self {
-        let count = points.len();
-        Self { tree: Tree::new(count, points.map(|point| (point, Aabb::of_point(point)))) }
+    pub(crate) fn new(points: &[Point3]) -> Self {
+        let with_box = |point: &Point3| (point.coordinates(), Aabb::of_point(point.coordinates()));
+        Self { tree: Tree::new(points.len(), points.iter().map(with_box)) }
     }
 
     /// The distance of every query to the nearest point, in their order.
-    pub(crate) fn distances(&self, queries: &[[f64; 3]]) -> Vec<f64> {
+    pub(crate) fn distances(&self, queries: &[Point3]) -> Vec<f64> {
         self.tree.distances(Arch::new(), queries)
     }
 }
@@ -34,14 +51,17 @@ pub(crate) struct PolylineIndex<const N: usize> {
 
 impl<const N: usize> PolylineIndex<N> {
     /// The polyline through `vertices`, which are finite and at least one; one vertex is a point.
-    pub(crate) fn new(vertices: &[[f64; N]]) -> Self {
+    pub(crate) fn new<V: Place<N>>(vertices: &[V]) -> Self {
         Self::of_pieces(std::iter::once(vertices))
     }
 
     /// All of several polylines.
-    pub(crate) fn of_pieces<'a>(pieces: impl Iterator<Item = &'a [[f64; N]]> + Clone) -> Self {
+    pub(crate) fn of_pieces<'a, V: Place<N> + 'a>(
+        pieces: impl Iterator<Item = &'a [V]> + Clone,
+    ) -> Self {
         let count = pieces.clone().map(<[_]>::len).sum();
-        let edge = |from: [f64; N], to: [f64; N]| {
+        let edge = |from: V, to: V| {
+            let (from, to) = (from.coordinates(), to.coordinates());
             (Edge::new(from, to), Aabb::of_point(from).joined(Aabb::of_point(to)))
         };
         let edges = pieces.flat_map(|vertices| {
@@ -52,13 +72,9 @@ impl<const N: usize> PolylineIndex<N> {
     }
 
     /// The distance of every query to the nearest point of the polylines, in their order.
-    pub(crate) fn distances(&self, queries: &[[f64; N]]) -> Vec<f64> {
+    pub(crate) fn distances<Q: Place<N>>(&self, queries: &[Q]) -> Vec<f64> {
         self.tree.distances(Arch::new(), queries)
     }
-}
-
-pub(crate) fn coordinates(points: &[Point3]) -> Vec<[f64; 3]> {
-    points.iter().map(|point| point.coords.into()).collect()
 }
 
 #[cfg(test)]
@@ -127,7 +143,8 @@ mod tests {
     }
 
     fn check(vertices: &[[f64; 3]], queries: &[[f64; 3]]) -> Result<(), TestCaseError> {
-        let to_points = PointIndex::new(vertices.iter().copied());
+        let points: Vec<Point3> = vertices.iter().map(|&v| v.into()).collect();
+        let to_points = PointIndex::new(&points);
         let to_line = PolylineIndex::new(vertices);
         for machine in machines() {
             let points = to_points.tree.distances(machine, queries);

@@ -1,5 +1,6 @@
 use pulp::{Arch, Simd, WithSimd};
 
+use super::Place;
 use super::piece::{Piece, any, dot};
 
 /// Pieces in one leaf.
@@ -59,7 +60,7 @@ impl<const N: usize, T: Piece<N>> Tree<N, T> {
     }
 
     /// The distance of every query to the nearest piece, in the order of the queries.
-    pub(super) fn distances(&self, machine: Arch, queries: &[[f64; N]]) -> Vec<f64> {
+    pub(super) fn distances<Q: Place<N>>(&self, machine: Arch, queries: &[Q]) -> Vec<f64> {
         let mut distances = vec![0.0; queries.len()];
         machine.dispatch(Search { tree: self, queries, distances: &mut distances });
         distances
@@ -119,13 +120,13 @@ impl<const N: usize, T: Piece<N>> Tree<N, T> {
     }
 }
 
-struct Search<'a, const N: usize, T> {
+struct Search<'a, const N: usize, T, Q> {
     tree: &'a Tree<N, T>,
-    queries: &'a [[f64; N]],
+    queries: &'a [Q],
     distances: &'a mut [f64],
 }
 
-impl<const N: usize, T: Piece<N>> WithSimd for Search<'_, N, T> {
+impl<const N: usize, T: Piece<N>, Q: Place<N>> WithSimd for Search<'_, N, T, Q> {
     type Output = ();
 
     #[inline(always)]
@@ -137,6 +138,7 @@ impl<const N: usize, T: Piece<N>> WithSimd for Search<'_, N, T> {
         for (queries, distances) in self.queries.chunks(lanes).zip(self.distances.chunks_mut(lanes))
         {
             for (lane, query) in queries.iter().enumerate() {
+                let query = query.coordinates();
                 for k in 0..N {
                     rows[k][lane] = query[k];
                 }
