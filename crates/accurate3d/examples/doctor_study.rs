@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
 
 #[path = "../tests/support/mistaken_rigs.rs"]
+#[allow(dead_code)] // The wires are for another study.
 mod mistaken_rigs;
 
 use accurate_geom::LengthUnit;

@@ -96,12 +96,18 @@ function recolour() {
     swatch("var(--curve)", "reconstructed curve");
   }
   if (data.truth) swatch("var(--truth)", "truth");
+  if (cut) swatch("color-mix(in srgb, var(--curve) 30%, transparent)", "tube, cut off where it is wider than shown");
   if (curve.along.some(Boolean)) swatch("var(--flag)", "along an epipolar line (depth weakly seen)");
   swatch("var(--one)", "ray and trace of view 1");
   swatch("var(--two)", "ray and trace of view 2");
 }
 colourSelect.addEventListener("change", recolour);
-tubeSelect.addEventListener("change", () => scene?.setTube(Number(tubeSelect.value)));
+let cut = false;
+function retube() {
+  cut = scene?.setTube(Number(tubeSelect.value)) ?? false;
+  recolour();
+}
+tubeSelect.addEventListener("change", retube);
 byId("reset").addEventListener("click", () => scene?.reset());
 if (curve.sigma) {
   // Thin tubes cannot be seen at true size: begin with one that can.
@@ -112,7 +118,7 @@ if (curve.sigma) {
   });
   const relative = (1.96 * sorted[sorted.length >> 1]) / (Math.max(...box) || 1);
   tubeSelect.value = String(relative > 0.012 ? 1 : relative > 0.0025 ? 5 : 20);
-  scene?.setTube(Number(tubeSelect.value));
+  retube();
 }
 
 // The profile along the curve.
@@ -207,7 +213,10 @@ const flat = (value, name = "") =>
   : Array.isArray(value) ? [[name, value.map((v) => (typeof v === "number" ? number(v, 4) : v)).join(", ") || "none"]]
   : typeof value === "object" ? Object.entries(value).flatMap(([k, v]) => flat(v, name ? `${name}, ${words(k)}` : words(k)))
   : [[name, typeof value === "number" ? number(value, 4) : String(value)]];
-keyTable(byId("diagnostics"), flat(d));
+const { evidence, ...outline } = d.outline ?? {};
+keyTable(byId("diagnostics"), flat(d.outline ? { ...d, outline } : d));
+if (evidence) keyTable(byId("evidence"), flat(evidence));
+else byId("evidence").parentElement.hidden = true;
 if (data.scores) keyTable(byId("scores"), flat(data.scores).map(([k, v]) => [k, `${v} ${unit}`]));
 else byId("scores-card").append(element("p", { class: "muted small" }, "The pair has no truth; nothing is scored."));
 const p = data.provenance;

@@ -88,13 +88,19 @@ export function makeScene(holder, data, onPick) {
   }
   let cloud = null;
   const halo = new THREE.MeshStandardMaterial({ transparent: true, opacity: 0.24, depthWrite: false, roughness: 1 });
+  // Returns whether the tube was cut off somewhere: one wider than this hides everything else.
+  const WIDEST = 0.15;
   const setTube = (factor) => {
     if (cloud) { scene.remove(cloud); cloud.geometry.dispose(); cloud = null; }
+    let cut = false;
     if (data.curve.sigma && factor > 0) {
-      cloud = new THREE.Mesh(tube(points, data.curve.sigma.map((s) => core + (1.96 * s * factor) / extent), sides), halo);
+      const radii = data.curve.sigma.map((s) => (1.96 * s * factor) / extent);
+      cut = radii.some((r) => r > WIDEST);
+      cloud = new THREE.Mesh(tube(points, radii.map((r) => core + Math.min(r, WIDEST)), sides), halo);
       scene.add(cloud);
     }
     draw();
+    return cut;
   };
   const ball = new THREE.Mesh(new THREE.SphereGeometry(0.018, 24, 16), new THREE.MeshStandardMaterial({ roughness: 0.4 }));
   scene.add(ball);

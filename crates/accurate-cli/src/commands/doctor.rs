@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use accurate3d::NOT_FOR_CLINICAL_USE;
 use accurate3d::doctor::{
-    CANNOT_BE_TOLD, Diagnosis, DoctorError, Finding, Seen, Verdict, diagnose,
+    CANNOT_BE_TOLD, Diagnosis, DoctorError, Finding, LEAST_PLACES, Mistake, Seen, Verdict, diagnose,
 };
 use accurate3d::geom::{Camera, LengthUnit, Point2, Rig, View1};
 use accurate3d::io::{
@@ -207,6 +207,16 @@ fn as_text(diagnosis: &Diagnosis, seen: &Seen) -> String {
     };
     let mut text =
         format!("{what}: {residual}, {:.0} % in front of both", 100.0 * diagnosis.in_front);
+    if let Some(places) = diagnosis.turning_places {
+        text.push_str(&format!(
+            "\n{places} places where both curves turn round at an epipolar line{}",
+            if places < LEAST_PLACES {
+                format!(": too few to tell whether pixels are displaced by a few px, which takes {LEAST_PLACES} (give more pairs of the same rig)")
+            } else {
+                String::new()
+            }
+        ));
+    }
     for finding in &diagnosis.findings {
         text.push_str(&format!(
             "\n!! {} in {}: {:.2} -> {:.2} px if undone\n   fix: {}",
@@ -244,7 +254,7 @@ fn as_text(diagnosis: &Diagnosis, seen: &Seen) -> String {
 
 fn views_of(finding: &Finding) -> String {
     match finding.mistake {
-        accurate3d::doctor::Mistake::ViewsSwapped => "the pair".to_owned(),
+        Mistake::ViewsSwapped | Mistake::PixelsDisplaced(_) => "the pair".to_owned(),
         _ => finding.which.to_string(),
     }
 }
@@ -272,6 +282,7 @@ fn as_json(views: &[NamedView; 2], diagnosis: &Diagnosis) -> Value {
         "residual_px": diagnosis.residual_px,
         "in_front": diagnosis.in_front,
         "points": diagnosis.points,
+        "turning_places": diagnosis.turning_places,
         "findings": diagnosis.findings.iter().map(finding).collect::<Vec<_>>(),
         "remarks": diagnosis.remarks.iter().map(|r| r.to_string()).collect::<Vec<_>>(),
         "cannot_be_told": CANNOT_BE_TOLD,

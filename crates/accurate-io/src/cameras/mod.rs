@@ -9,8 +9,10 @@ mod opencv;
 mod projection_list;
 mod write;
 
+#[cfg(feature = "dicom")]
 pub(crate) use detect::stem;
 pub use detect::{CameraSource, is_dicom, read_cameras};
+#[cfg(feature = "dicom")]
 pub(crate) use named_view::RawView;
 pub use named_view::{NamedView, ViewDefaults};
 pub use write::{CameraFormat, write_cameras};

@@ -135,7 +135,7 @@ fn is_finite(p: &Point2) -> bool {
     p.x.is_finite() && p.y.is_finite()
 }
 
-fn freed<V: View>(camera: &Camera, point: &Point2) -> Option<Pixel<V>> {
+pub(super) fn freed<V: View>(camera: &Camera, point: &Point2) -> Option<Pixel<V>> {
     camera.undistort(point).ok().map(Pixel::from)
 }
 
@@ -205,7 +205,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// The camera for pixels counted in units of `px`.
-fn scaled(camera: &Camera, px: f64) -> Option<Camera> {
+pub(super) fn scaled(camera: &Camera, px: f64) -> Option<Camera> {
     let mut scale = Matrix3::identity() / px;
     scale[(2, 2)] = 1.0;
     let other = Camera::new(scale * camera.k(), *camera.r(), *camera.t(), camera.size()).ok()?;

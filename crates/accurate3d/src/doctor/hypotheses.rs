@@ -1,7 +1,8 @@
 use accurate_geom::Camera;
 
+use super::SAME_NATS;
 use super::evidence::{Evidence, Explains};
-use super::mistake::{Mistake, Which};
+use super::mistake::{LensCentre, Mistake, Which};
 
 /// A mistake that may have been made, and how well everything fits if it is undone.
 #[derive(Debug, Clone)]
@@ -48,6 +49,11 @@ const LEAST_MAGNIFIED: f64 = 1.08;
 /// Largest displacement by a lens that is looked at, as a share of the distance from the middle, at
 /// the image's corner.
 const MOST_DISTORTED: f64 = 0.25;
+/// Largest displacement of pixels across their epipolar lines that is looked at, as a share of the
+/// image's width.
+const MOST_DISPLACED: f64 = 0.08;
+/// Less displacement than this, px, is an imprecise calibration: `--refine-calibration` is for it.
+const LEAST_DISPLACED_PX: f64 = 3.0;
 
 /// Every single mistake undone, that can be in these cameras.
 pub(super) fn singles(cameras: &[Camera; 2], evidence: &Evidence) -> Vec<Hypothesis> {
@@ -72,8 +78,8 @@ fn small(cameras: &[Camera; 2], evidence: &Evidence) -> Vec<Hypothesis> {
         for shift in [0.5, -0.5] {
             let half = tried(Mistake::PixelOrigin(shift), which, cameras, evidence);
             let whole = tried(Mistake::PixelOrigin(2.0 * shift), which, cameras, evidence);
-            // Where a whole pixel is better still, half a pixel is not what is wrong.
-            let more = whole.map_or(f64::INFINITY, |h| h.explains.nats);
+            // Where a whole pixel is plainly better still, half a pixel is not what is wrong.
+            let more = whole.map_or(f64::INFINITY, |h| h.explains.nats + SAME_NATS);
             all.extend(half.filter(|h| h.explains.nats <= more));
         }
     }
@@ -83,14 +89,40 @@ fn small(cameras: &[Camera; 2], evidence: &Evidence) -> Vec<Hypothesis> {
         all.extend(searched(magnified, most, which, cameras, evidence).filter(|h| {
             matches!(h.mistake, Mistake::Magnification(m) if m.ln().abs() > LEAST_MAGNIFIED.ln())
         }));
-        let corner = cameras.each_ref().map(corner_radius_squared);
-        let widest = corner[0].max(corner[1]);
-        let lens = |x: f64| Mistake::LensNotRemoved(x / widest);
-        all.extend(searched(lens, MOST_DISTORTED, which, cameras, evidence).filter(
-            |h| matches!(h.mistake, Mistake::LensNotRemoved(k1) if displaces(k1, cameras)),
-        ));
+        all.extend(lens(which, cameras, evidence).filter(|(_, px)| *px > 1.0).map(|(h, _)| h));
     }
     all
+}
+
+/// Pixels that `K`, `R` and `t` do not hold for: by a lens, or all much alike. `turns` are matched
+/// points where curves turn round.
+pub(super) fn displaced(cameras: &[Camera; 2], turns: &Evidence) -> Vec<Hypothesis> {
+    let most = MOST_DISPLACED * f64::from(cameras[1].size().width);
+    let alike = searched(Mistake::PixelsDisplaced, most, Which::Both, cameras, turns).filter(
+        |h| matches!(h.mistake, Mistake::PixelsDisplaced(px) if px.abs() > LEAST_DISPLACED_PX),
+    );
+    let lenses = Which::ALL.into_iter().filter_map(|which| {
+        lens(which, cameras, turns).filter(|(_, px)| *px > LEAST_DISPLACED_PX).map(|(h, _)| h)
+    });
+    lenses.chain(alike).collect()
+}
+
+/// The best lens about either centre, and by how much it moves pixels, px, at the middle of the sides
+/// of the larger image.
+fn lens(which: Which, cameras: &[Camera; 2], evidence: &Evidence) -> Option<(Hypothesis, f64)> {
+    let about = |about: LensCentre| {
+        let lens = |share: f64| Mistake::LensNotRemoved { share, about };
+        searched(lens, MOST_DISTORTED, which, cameras, evidence)
+    };
+    let both = [about(LensCentre::PrincipalPoint), about(LensCentre::Middle)];
+    let better = |a: &Hypothesis, b: &Hypothesis| a.explains.nats.total_cmp(&b.explains.nats);
+    let found = both.into_iter().flatten().min_by(better)?;
+    let Mistake::LensNotRemoved { share, .. } = found.mistake else { return None };
+    let moved = cameras.each_ref().map(|camera| {
+        let (w, h) = (f64::from(camera.size().width), f64::from(camera.size().height));
+        share.abs() * 0.5 * w * (w * w) / (w * w + h * h)
+    });
+    Some((found, moved[0].max(moved[1])))
 }
 
 /// The mistakes without a number, alone.
@@ -156,23 +188,4 @@ fn searched(
     }
     let refined = if cost(&at_a) <= cost(&at_b) { at_a } else { at_b };
     if cost(&refined) <= cost(&best) { refined } else { best }
-}
-
-/// Squared distance of the image's corner from the middle, in focal lengths.
-fn corner_radius_squared(camera: &Camera) -> f64 {
-    let (k, size) = (camera.k(), camera.size());
-    let x = 0.5 * f64::from(size.width) / k[(0, 0)];
-    let y = 0.5 * f64::from(size.height) / k[(1, 1)];
-    x * x + y * y
-}
-
-/// Whether a lens moves some pixel by more than an imprecise calibration might: 1 px at the middle of
-/// the image's sides.
-fn displaces(k1: f64, cameras: &[Camera; 2]) -> bool {
-    cameras.iter().any(|camera| {
-        let (k, size) = (camera.k(), camera.size());
-        let half = 0.5 * f64::from(size.width);
-        let r = half / k[(0, 0)];
-        (k1 * r * r * half).abs() > 1.0
-    })
 }

@@ -1,7 +1,7 @@
 use std::fmt;
 
 use accurate_geom::nalgebra::{Matrix3, Vector3};
-use accurate_geom::{Camera, Distortion, ImageSize, Point2};
+use accurate_geom::{Camera, Distortion, ImageSize, LengthUnit, Pixel, Point2, Rig, View1};
 
 use crate::c_arm::{ArmPlace, arm};
 
@@ -48,11 +48,30 @@ pub enum Mistake {
     /// at the detector where it is at the isocentre, or the other way round. (The ratio is then
     /// source to detector over source to isocentre.)
     Magnification(f64),
-    /// The lens distortion was not removed from the pixels, and the camera does not know it. The
-    /// number is an estimate of `k1` alone.
-    LensNotRemoved(f64),
+    /// The lens distortion was not removed from the pixels, and the camera does not know it.
+    LensNotRemoved {
+        /// Displacement at the image's corner as a share of its distance from the middle, as `k1`
+        /// alone would make it. Positive: pincushion.
+        share: f64,
+        /// What the displacement is about.
+        about: LensCentre,
+    },
     /// The pixels are free of distortion already, but the camera would have it removed again.
     LensRemovedTwice,
+    /// `K`, `R` and `t` hold for other pixels: those of an undistorted picture (an image intensifier
+    /// bends and shifts its picture), or of one that was cropped or moved. The number is how far, px,
+    /// pixels of view 2 lie beside the epipolar lines of view 1 on average: the only part of a
+    /// displacement that two curves show.
+    PixelsDisplaced(f64),
+}
+
+/// The point of the image that a lens leaves where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LensCentre {
+    /// The principal point, as in OpenCV's model.
+    PrincipalPoint,
+    /// The middle of the image: of image intensifiers, whose principal point may be elsewhere.
+    Middle,
 }
 
 /// Which views a mistake is in.
@@ -107,8 +126,9 @@ impl Mistake {
             Self::ImageScale(_) => "image-scale",
             Self::PixelOrigin(_) => "half-pixel",
             Self::Magnification(_) => "magnification",
-            Self::LensNotRemoved(_) => "lens-not-removed",
+            Self::LensNotRemoved { .. } => "lens-not-removed",
             Self::LensRemovedTwice => "lens-removed-twice",
+            Self::PixelsDisplaced(_) => "pixels-displaced",
         }
     }
 
@@ -123,6 +143,9 @@ impl Mistake {
         if *self == Self::ViewsSwapped {
             let [one, two] = cameras;
             return Some([two.clone(), one.clone()]);
+        }
+        if let Self::PixelsDisplaced(off_px) = *self {
+            return moved_across(cameras, off_px);
         }
         let mut mended = cameras.clone();
         for (index, camera) in mended.iter_mut().enumerate() {
@@ -188,13 +211,23 @@ impl Mistake {
                  isocentre's where the detector's belongs, or the other way round (the ratio is \
                  source-detector over source-isocentre distance)"
             ),
-            Self::LensNotRemoved(k1) => format!(
-                "undistort the pixels {of}, or state the lens (with k1 alone it would be about \
-                 {k1:.3})"
+            Self::LensNotRemoved { share, .. } => format!(
+                "undistort the pixels {of}, or state the lens (k1 alone would move the image's \
+                 corners by {:.1} % of their distance from the middle, {})",
+                100.0 * share.abs(),
+                if *share > 0.0 { "outwards" } else { "inwards" }
             ),
             Self::LensRemovedTwice => {
                 format!("leave the distortion coefficients {of} out: the pixels are undistorted")
             }
+            Self::PixelsDisplaced(off_px) => format!(
+                "undistort the pixels with the lens or grid that the calibration came with (an image \
+                 intensifier bends and shifts its picture): K, R and t do not hold for these, which \
+                 lie {:.1} px beside their epipolar lines where the curves turn round; if they are \
+                 undistorted, give K of the picture as it was cropped or moved (curves cannot tell \
+                 the two apart; the mended cameras have the principal point of view 2 moved)",
+                off_px.abs()
+            ),
         }
     }
 
@@ -204,7 +237,7 @@ impl Mistake {
         let [width, height] = [f64::from(size.width), f64::from(size.height)];
         match *self {
             // Of both cameras at once, see `mend`.
-            Self::ViewsSwapped => None,
+            Self::ViewsSwapped | Self::PixelsDisplaced(_) => None,
             Self::InverseExtrinsics => {
                 with(camera, k, *camera.r_inverse(), -(camera.r_inverse() * t))
             }
@@ -245,14 +278,21 @@ impl Mistake {
                 }
                 with(camera, k, r, t)
             }
-            Self::LensNotRemoved(k1) => {
+            Self::LensNotRemoved { share, about } => {
                 if camera.distortion().is_some() {
                     return None;
                 }
-                // About the middle of the image, which to first order is Brown's decentring.
-                let middle = Point2::new(0.5 * (width - 1.0), 0.5 * (height - 1.0));
-                let middle = camera.k_inverse() * middle.to_homogeneous();
-                let (p1, p2) = (-k1 * middle.y, -k1 * middle.x);
+                let corner = Point2::new(0.5 * width / k[(0, 0)], 0.5 * height / k[(1, 1)]);
+                let k1 = share / corner.coords.norm_squared();
+                let (p1, p2) = match about {
+                    LensCentre::PrincipalPoint => (0.0, 0.0),
+                    // To first order that is Brown's decentring.
+                    LensCentre::Middle => {
+                        let middle = Point2::new(0.5 * (width - 1.0), 0.5 * (height - 1.0));
+                        let middle = camera.k_inverse() * middle.to_homogeneous();
+                        (-k1 * middle.y, -k1 * middle.x)
+                    }
+                };
                 camera.clone().with_distortion(Distortion { k1, p1, p2, k3: 0.0, k2: 0.0 }).ok()
             }
             Self::LensRemovedTwice => {
@@ -280,6 +320,20 @@ fn mirrored(k: &Matrix3<f64>, row: usize, side: f64) -> Matrix3<f64> {
     }
     k[(row, 2)] += side - 1.0;
     k
+}
+
+/// Camera 2 with its principal point moved across the epipolar line of the middle of view 1.
+fn moved_across(cameras: &[Camera; 2], off_px: f64) -> Option<[Camera; 2]> {
+    let [one, two] = cameras;
+    let rig = Rig::new(one.clone(), two.clone(), LengthUnit::Unit).ok()?;
+    let size = one.size();
+    let middle = Point2::new(0.5 * f64::from(size.width), 0.5 * f64::from(size.height));
+    let line = rig.fundamental().transpose().line(Pixel::<View1>::from(middle)).ok()?;
+    let across = line.coefficients().xy().try_normalize(0.0)?;
+    let mut k = *two.k();
+    k[(0, 2)] += off_px * across.x;
+    k[(1, 2)] += off_px * across.y;
+    Some([one.clone(), with(two, k, *two.r(), *two.t())?])
 }
 
 /// The camera of the transposed image.

@@ -8,15 +8,17 @@ mod evidence;
 mod hypotheses;
 mod mistake;
 mod scale;
+mod turns;
 
-use accurate_geom::{Camera, GeomError, LengthUnit};
+use accurate_geom::{Camera, GeomError, LengthUnit, Point2};
 use thiserror::Error;
 
 pub use evidence::Seen;
 use evidence::{Evidence, Explains};
-use hypotheses::{Hypothesis, plain, singles};
-pub use mistake::{Mistake, Which};
+use hypotheses::{Hypothesis, displaced, plain, singles};
+pub use mistake::{LensCentre, Mistake, Which};
 pub use scale::Remark;
+pub use turns::LEAST_PLACES;
 
 /// Why two views could not be examined.
 #[derive(Debug, Error)]
@@ -51,7 +53,7 @@ pub struct Finding {
     pub mistake: Mistake,
     /// In which views.
     pub which: Which,
-    /// Residual before it is undone, px.
+    /// Residual before it is undone, px. Of displaced pixels seen with curves: where these turn round.
     pub before_px: f64,
     /// Residual after, px.
     pub after_px: f64,
@@ -82,6 +84,10 @@ pub struct Diagnosis {
     pub in_front: f64,
     /// Matched points, or samples of curves.
     pub points: usize,
+    /// Of curves that fit: the places where both turn round at an epipolar line, which alone show
+    /// whether the pixels are displaced (a lens, a cropped picture). Fewer than [`LEAST_PLACES`]
+    /// tell nothing.
+    pub turning_places: Option<usize>,
     /// The mistakes, in the order in which they are to be undone.
     pub findings: Vec<Finding>,
     /// What looks odd without being a mistake for sure.
@@ -107,10 +113,12 @@ const SAME_NATS: f64 = 4.6;
 const LEAST_FALL: f64 = 0.7;
 const LEAST_FALL_SMALL: f64 = 0.85;
 const LEAST_FALL_HALF_PIXEL: f64 = 0.95;
+const LEAST_FALL_TURNS: f64 = 0.5;
 /// What is left is at most this, px, unless the residual has fallen to a third. For mistakes that move
 /// pixels little it has to be noise: an imprecise calibration gives way to a number as well.
 const PLAUSIBLE_PX: f64 = 3.0;
 const NOISE_PX: f64 = 0.5;
+const TRACED_PX: f64 = 1.5;
 const LARGE_FALL: f64 = 0.35;
 /// Less than this share in front of both cameras makes no scene.
 const LEAST_IN_FRONT: f64 = 0.9;
@@ -137,7 +145,21 @@ pub fn diagnose(
     let mut now = given;
     let mut mended = cameras.clone();
     let mut findings: Vec<Finding> = Vec::new();
+    let mut turning_places = None;
     while findings.len() < MOST_FINDINGS {
+        if let Evidence::Curves { curves, px } = &evidence
+            && now.is_some_and(|now| is_plausible(&now, &evidence))
+        {
+            let turns = turns::of_curves(curves, *px, &mended);
+            turning_places = Some(turns.len());
+            let known = findings.iter().any(is_of_pixels);
+            if let Some((finding, h)) = displaced_pixels(&mended, turns).filter(|_| !known) {
+                now = evidence.explained_by(&h.cameras);
+                mended = h.cameras;
+                findings.push(finding);
+                continue;
+            }
+        }
         let Some(found) = next_findings(&mended, now.as_ref(), &evidence) else { break };
         let Some(last) = found.last() else { break };
         now = Some(last.1.explains);
@@ -157,10 +179,38 @@ pub fn diagnose(
         residual_px: given.map(|g| g.residual_px),
         in_front: given.map_or(0.0, |g| g.in_front),
         points: evidence.count(),
+        turning_places,
         findings,
         remarks: scale::remarks(&mended, unit, after.depth, seen),
         mended,
     })
+}
+
+/// Whether these are other pixels than the cameras hold for, by the places where curves turn round:
+/// what moves pixels little does not show in the match of curves elsewhere.
+fn displaced_pixels(
+    cameras: &[Camera; 2],
+    turns: Vec<[Point2; 2]>,
+) -> Option<(Finding, Hypothesis)> {
+    if turns.len() < LEAST_PLACES {
+        return None;
+    }
+    let turns = Evidence::Matched(turns);
+    let now = turns.explained_by(cameras);
+    // A half turn of both pictures, for one, only moves them where the principal points are off the
+    // middle: such a mistake is named beside, or before, if it explains as much.
+    let all: Vec<_> =
+        plain(cameras, &turns).into_iter().chain(displaced(cameras, &turns)).collect();
+    named(&all, now.as_ref(), false).filter(|(finding, _)| is_of_pixels(finding))
+}
+
+/// Whether displaced pixels are what was found, or cannot be told from it.
+fn is_of_pixels(finding: &Finding) -> bool {
+    is_displacement(&finding.mistake) || finding.or.iter().any(|(m, _)| is_displacement(m))
+}
+
+const fn is_displacement(mistake: &Mistake) -> bool {
+    matches!(mistake, Mistake::PixelsDisplaced(_) | Mistake::LensNotRemoved { .. })
 }
 
 /// The next mistake, or the next two where one alone explains too little.
@@ -170,7 +220,7 @@ fn next_findings(
     evidence: &Evidence,
 ) -> Option<Vec<(Finding, Hypothesis)>> {
     let all = singles(cameras, evidence);
-    let single = named(&all, now, evidence);
+    let single = named(&all, now, evidence.is_matched());
     let enough = |h: &Hypothesis| is_plausible(&h.explains, evidence);
     if let Some((finding, hypothesis)) = single.clone()
         && enough(&hypothesis)
@@ -192,7 +242,9 @@ fn next_findings(
             continue;
         }
         let seconds = plain(&first.cameras, evidence);
-        let Some((second, hypothesis)) = named(&seconds, now, evidence) else { continue };
+        let Some((second, hypothesis)) = named(&seconds, now, evidence.is_matched()) else {
+            continue;
+        };
         let better = best
             .as_ref()
             .is_none_or(|[_, (_, b)]| hypothesis.explains.nats < b.explains.nats - SAME_NATS);
@@ -220,10 +272,9 @@ fn next_findings(
 fn named(
     all: &[Hypothesis],
     now: Option<&Explains>,
-    evidence: &Evidence,
+    matched: bool,
 ) -> Option<(Finding, Hypothesis)> {
-    let better: Vec<&Hypothesis> =
-        all.iter().filter(|h| is_better(h, now, evidence.is_matched())).collect();
+    let better: Vec<&Hypothesis> = all.iter().filter(|h| is_better(h, now, matched)).collect();
     let least = better.iter().map(|h| penalised(h)).min_by(f64::total_cmp)?;
     // In the order of the list: the likelier mistake first.
     let mut same = better.into_iter().filter(|h| penalised(h) <= least + SAME_NATS);
@@ -240,7 +291,10 @@ fn named(
 
 /// A number that was searched for has to earn it (2 nats: Akaike's criterion counts 1).
 fn penalised(h: &Hypothesis) -> f64 {
-    let free = matches!(h.mistake, Mistake::Magnification(_) | Mistake::LensNotRemoved(_));
+    let free = matches!(
+        h.mistake,
+        Mistake::Magnification(_) | Mistake::LensNotRemoved { .. } | Mistake::PixelsDisplaced(_)
+    );
     h.explains.nats + if free { 2.0 } else { 0.0 }
 }
 
@@ -256,11 +310,13 @@ fn is_better(h: &Hypothesis, now: Option<&Explains>, matched: bool) -> bool {
     let fall = h.explains.residual_px / now.residual_px;
     let (share, left_px) = match h.mistake {
         Mistake::PixelOrigin(_) => (LEAST_FALL_HALF_PIXEL, NOISE_PX),
-        Mistake::Magnification(_) | Mistake::LensNotRemoved(_) | Mistake::LensRemovedTwice
+        Mistake::Magnification(_) | Mistake::LensNotRemoved { .. } | Mistake::LensRemovedTwice
             if matched =>
         {
             (LEAST_FALL_SMALL, NOISE_PX)
         }
+        // Seen where curves turn round, and traced no better than to a pixel.
+        mistake if is_displacement(&mistake) => (LEAST_FALL_TURNS, TRACED_PX),
         _ => (LEAST_FALL, PLAUSIBLE_PX),
     };
     let plausible = !matched || h.explains.residual_px <= left_px || fall <= LARGE_FALL;

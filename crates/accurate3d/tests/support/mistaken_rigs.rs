@@ -1,8 +1,8 @@
 //! Random sound rigs with beads seen in both views, and the same with one mistake in them.
 
-use accurate_geom::nalgebra::{Matrix3, Rotation3, Vector3};
+use accurate_geom::nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 use accurate_geom::{Camera, Distortion, ImageSize, Point2, Point3};
-use accurate3d::doctor::{Mistake, Which};
+use accurate3d::doctor::{LensCentre, Mistake, Which};
 
 pub const BEADS: usize = 100;
 
@@ -44,6 +44,10 @@ impl Stream {
 pub struct Scene {
     pub cameras: [Camera; 2],
     pub beads: Vec<[Point2; 2]>,
+    /// The middle of what both see, in the world of `cameras` as they really are.
+    pub middle: Point3,
+    /// Half the width of what both see, mm.
+    pub reach: f64,
 }
 
 /// World to camera of a C-arm about the world's origin, DICOM's axes.
@@ -120,7 +124,71 @@ pub fn sound(seed: u64, index: u64) -> Scene {
             })
         })
         .collect();
-    Scene { cameras, beads }
+    Scene { cameras, beads, middle: target, reach: 0.33 * field_mm }
+}
+
+/// A wire in space, and its curves as traced in two views.
+pub struct Wire {
+    /// Every point in both views, without errors.
+    pub exact: Vec<[Point2; 2]>,
+    pub traced: [Vec<Point2>; 2],
+}
+
+/// Wires of a sound scene, each traced about 2 px apart with errors of 0.1 to 0.5 px that go on for
+/// some 10 px, in either direction, and with up to a tenth missing at each end in each view.
+pub fn wires(scene: &Scene, count: usize, seed: u64, index: u64) -> Vec<Wire> {
+    let mut stream = Stream::of(seed ^ 0x3173, index);
+    let error_px = stream.between(0.1, 0.5);
+    (0..count)
+        .map(|_| {
+            let waves: Vec<(Vector3<f64>, f64)> = (1..=4)
+                .map(|k| {
+                    let share = scene.reach / f64::from(k);
+                    let size = Vector3::from_fn(|_, _| stream.between(-share, share));
+                    (size, stream.between(0.0, std::f64::consts::PI))
+                })
+                .collect();
+            let points = 400;
+            let exact: Vec<[Point2; 2]> = (0..points)
+                .map(|i| {
+                    let s = std::f64::consts::PI * i as f64 / points as f64;
+                    let away: Vector3<f64> = (1..)
+                        .zip(&waves)
+                        .map(|(k, (size, phase))| size * (f64::from(k) * s + phase).cos())
+                        .sum();
+                    scene.cameras.each_ref().map(|c| {
+                        let p = c.project(&(scene.middle + away)).unwrap();
+                        Point2::new(p.x, p.y)
+                    })
+                })
+                .collect();
+            let traced = [0, 1].map(|view| {
+                let cut = [0, 1].map(|_| stream.between(0.0, 0.1 * points as f64) as usize);
+                let mut error = Vector2::zeros();
+                let mut curve: Vec<Point2> = exact[cut[0]..points - cut[1]]
+                    .iter()
+                    .map(|p| {
+                        // 0.8² + 0.6² = 1: the size of the errors stays.
+                        let fresh = Vector2::new(stream.normal(), stream.normal());
+                        error = 0.8 * error + 0.6 * error_px * fresh;
+                        p[view] + error
+                    })
+                    .collect();
+                if view == 1 && stream.next() & 1 == 0 {
+                    curve.reverse();
+                }
+                curve
+            });
+            Wire { exact, traced }
+        })
+        .collect()
+}
+
+/// The pixels of one view as they are before the lens is removed; `share` is the displacement at the
+/// image's corner over the radius.
+pub fn through_lens(camera: &Camera, share: f64, point: &Point2) -> Point2 {
+    let lens = Distortion { k1: share / corner(camera), ..Distortion::default() };
+    camera.clone().with_distortion(lens).unwrap().distort(point).unwrap()
 }
 
 /// Every mistake, each with a number of its own for a rig.
@@ -131,7 +199,7 @@ pub fn mistakes(seed: u64, index: u64) -> Vec<Mistake> {
     let half = [0.5, -0.5][(index % 2) as usize];
     let factor = stream.between(1.15, 1.6);
     let factor = if index.is_multiple_of(2) { factor } else { 1.0 / factor };
-    // Displacement of 3 to 12 % of the radius at the corner; `lens_of` makes k1 of it.
+    // Displacement of 3 to 12 % of the radius at the corner; `through_lens` makes k1 of it.
     let lens = stream.either(0.03, 0.12);
     vec![
         Mistake::ViewsSwapped,
@@ -152,7 +220,7 @@ pub fn mistakes(seed: u64, index: u64) -> Vec<Mistake> {
         Mistake::ImageScale(scale),
         Mistake::PixelOrigin(half),
         Mistake::Magnification(factor),
-        Mistake::LensNotRemoved(lens),
+        Mistake::LensNotRemoved { share: lens, about: LensCentre::PrincipalPoint },
         Mistake::LensRemovedTwice,
     ]
 }
@@ -169,11 +237,10 @@ pub fn spoiled(scene: &Scene, mistake: Mistake, which: Which) -> Option<(Scene, 
     };
     let mut spoiled = scene.clone();
     match mistake {
-        Mistake::LensNotRemoved(share) => {
+        Mistake::LensNotRemoved { share, .. } => {
             for (index, camera) in scene.cameras.iter().enumerate().filter(|(i, _)| in_view(*i)) {
-                let camera = with_lens(camera, share);
                 for bead in &mut spoiled.beads {
-                    bead[index] = camera.distort(&bead[index]).unwrap();
+                    bead[index] = through_lens(camera, share, &bead[index]);
                 }
             }
             Some((spoiled, mistake))
