@@ -140,10 +140,10 @@ for (const file of words) {
     await page.evaluate(() => { window.accurateReport.pick(Math.floor(window.accurateReport.count / 3)); window.scrollTo(0, 0); });
     await page.waitForTimeout(800);
     const name = basename(path, ".html") === "report" ? basename(dirname(path)) : basename(path, ".html");
-    await accept(page, name, await page.screenshot({ timeout: 180_000 }));
+    await accept(page, name, await page.screenshot({ timeout: 600_000 }));
     // Once all of a page, with everything that a page can have.
     if (await page.locator("#junctions").isVisible()) {
-      await accept(page, `${name}-whole`, await page.screenshot({ fullPage: true, timeout: 180_000 }));
+      await accept(page, `${name}-whole`, await page.screenshot({ fullPage: true, timeout: 600_000 }));
     }
   }
   await context.close();
