@@ -27,8 +27,9 @@ pub enum Suspicion {
     NotAdjusted,
 }
 
-/// Thresholds of the reasons, chosen on 350 generated pairs of tuning seeds (`doubt_study`; `easy`,
-/// `medium` also with discs, `hard`, `carm`; 7 of them wrong by more than 5 px). docs/deviations.md shows what they catch and what they cost: a result without a reason
+/// Thresholds of the reasons, chosen on 420 generated pairs of tuning seeds (`doubt_study`; `easy`,
+/// `medium` also with discs or turned, `hard`, `carm` also off in calibration; 7 of them wrong by more
+/// than 5 px). docs/deviations.md shows what they catch and what they cost: a result without a reason
 /// is likely, not certain, to be right.
 const UNEXPLAINED: f64 = 0.07;
 /// The same where a walk takes bridges: the faces of what hides the body are no one's outline ...
@@ -40,7 +41,7 @@ const CHI_PER_POINT_PX2: f64 = 0.068;
 const MARGIN: f64 = 4.0;
 const DISTANCE_PX: f64 = 0.4;
 const UNCOVERED: f64 = 0.1;
-const SIGMA_PX: f64 = 1.6;
+const SIGMA_PX: f64 = 1.9;
 
 /// The reasons to doubt a final choice, in the order of [`Suspicion`].
 pub(crate) fn suspicions(evidence: &Evidence) -> Vec<Suspicion> {
