@@ -6,6 +6,7 @@
 //! - [`Segmenter`]: whatever finds the body in an image, with a [`Segmentation`] as its answer;
 //! - [`Skeleton`]: its endpoints, junctions and gaps, and its pixels for the stages that follow;
 //! - [`gap_hints()`]: where a probability map goes on between two pieces of its mask;
+//! - [`ridge_centreline`]: a centreline between the pixels, and the width, from a probability map;
 //! - [`distance_to_background`], [`median_width_px`]: how thick the wire is.
 //!
 //! # Conventions
@@ -36,6 +37,7 @@ mod mask;
 #[cfg(feature = "network")]
 pub mod network;
 mod post_processing;
+mod ridge;
 mod segmentation;
 mod skeleton;
 mod spurs;
@@ -51,6 +53,7 @@ pub use error::SegError;
 pub use gap_hints::{GapHint, GapParams, gap_hints};
 pub use mask::Mask;
 pub use post_processing::PostProcessing;
+pub use ridge::{RidgeParams, RidgePoint, median_ridge_width_px, ridge_centreline};
 pub use segmentation::{Progress, Segmentation, Segmenter, Watch, unwatched};
 pub use skeleton::Skeleton;
 pub use thin::{guo_hall, zhang_suen};

@@ -1,5 +1,5 @@
-//! What the probability map adds to its mask in `accurate` mode: every pair is reconstructed from
-//! the mask alone and from mask and map.
+//! What the probability map adds to its mask in `accurate` mode: every pair is reconstructed twice,
+//! strays left out, with the fit judged by the mask alone and by the map.
 //!
 //! On maps that were damaged on purpose (no network needed):
 //! `cargo run -p accurate3d --example probability_study -- damaged medium 1000 20 [--calibrate]`.
@@ -37,9 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let scored: Vec<[Score; 2]> = pairs
         .par_iter()
-        .map(|pair| {
-            [InputKind::Mask, InputKind::Image].map(|input| Score::of(pair, input, calibrate))
-        })
+        .map(|pair| [false, true].map(|by_map| Score::of(pair, by_map, calibrate)))
         .collect();
     for (pair, [mask, map]) in pairs.iter().zip(&scored) {
         println!("{:<18} mask {mask}   map {map}", pair.id);
@@ -96,9 +94,9 @@ fn segmented(mut pair: ViewPair, maps: [Array2<f32>; 2]) -> Result<ViewPair, Box
 struct Score(Result<[f64; 4], String>);
 
 impl Score {
-    fn of(pair: &ViewPair, input: InputKind, calibrate: bool) -> Self {
-        let mut params = Params::new(input, Method::Accurate);
-        params.robust.by_probability = true;
+    fn of(pair: &ViewPair, by_probability: bool, calibrate: bool) -> Self {
+        let mut params = Params::new(InputKind::Image, Method::Accurate);
+        params.robust.by_probability = by_probability;
         params.robust.calibration = calibrate.then_some(CalibrationPriors::DEFAULT);
         let score = || -> Result<[f64; 4], Box<dyn Error>> {
             let truth = pair.truth.as_deref().ok_or("no truth")?;

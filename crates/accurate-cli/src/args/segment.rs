@@ -44,7 +44,8 @@ pub struct SegmentArgs {
     /// Grey images of 8 or 16 bits: PNG, JPEG, TIFF, PNM, BMP.
     #[arg(required = true, value_name = "IMAGE")]
     pub images: Vec<PathBuf>,
-    /// Folder for NAME_mask.png, NAME_probability.png (16 bits) and NAME_overlay.png.
+    /// Folder for NAME_mask.png, NAME_probability.png (16 bits), NAME_overlay.png and
+    /// NAME_centreline.csv (the ridge of the probability between the pixels, with the width there).
     #[arg(short, long, value_name = "DIR")]
     pub out: PathBuf,
     /// Probability above which a pixel begins the body, 0 to 1 (default: the model's own). Weaker

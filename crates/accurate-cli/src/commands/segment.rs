@@ -5,7 +5,8 @@ use accurate3d::NOT_FOR_CLINICAL_USE;
 use accurate3d::io::{read_grey, write_mask, write_rgb, write_u16};
 use accurate3d::seg::network::{NetworkOptions, NetworkSegmenter, Polarity};
 use accurate3d::seg::{
-    Components, Mask, PostProcessing, Segmenter, median_width_px, unwatched, zhang_suen,
+    Components, Mask, PostProcessing, RidgeParams, RidgePoint, Segmenter, median_ridge_width_px,
+    median_width_px, ridge_centreline, unwatched, zhang_suen,
 };
 use ndarray::Array2;
 use serde_json::{Value, json};
@@ -14,7 +15,7 @@ use crate::args::{Photometric, SegmentArgs};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::segmentation::segmenter_with;
-use crate::text::make_folder;
+use crate::text::{make_folder, write_text};
 
 /// Part of `--threshold` down to which connected pixels are taken: the default's 0.3 of 0.5.
 const WEAK: f32 = 0.6;
@@ -96,8 +97,12 @@ fn one(
     let sixteen = found.probability.mapv(|p| (p * 65_535.0).round() as u16);
     write_u16(&file("probability"), &sixteen)?;
     write_rgb(&file("overlay"), &overlay(&image, &skeleton))?;
-    let pieces = Components::of(&found.mask)?.sizes().len();
     let width = if found.mask.is_empty() { None } else { Some(median_width_px(&found.mask)?) };
+    let params = RidgeParams::for_width(width.unwrap_or(1.0));
+    let ridge = ridge_centreline(&found.probability, &skeleton, &params)?;
+    let centreline = out.join(format!("{name}_centreline.csv"));
+    write_text(&centreline, &centreline_csv(&ridge))?;
+    let pieces = Components::of(&found.mask)?.sizes().len();
     let (height, columns) = image.dim();
     Ok(json!({
         "image": path.display().to_string(),
@@ -106,16 +111,18 @@ fn one(
         "skeleton_px": skeleton.count(),
         "pieces": pieces,
         "median_width_px": width,
+        "median_ridge_width_px": median_ridge_width_px(&ridge),
         "mask": file("mask").display().to_string(),
         "probability": file("probability").display().to_string(),
         "overlay": file("overlay").display().to_string(),
+        "centreline": centreline.display().to_string(),
         "segmentation": segmenter.describe(),
         "note": NOT_FOR_CLINICAL_USE,
     }))
 }
 
 fn line(report: &Value) -> String {
-    let width = report["median_width_px"].as_f64().map(|w| format!(", {w:.0} px wide"));
+    let width = report["median_ridge_width_px"].as_f64().map(|w| format!(", {w:.1} px wide"));
     format!(
         "{}: {} skeleton pixels in {} pieces{}",
         report["image"].as_str().unwrap_or_default(),
@@ -123,6 +130,15 @@ fn line(report: &Value) -> String {
         report["pieces"],
         width.unwrap_or_default()
     )
+}
+
+/// One line a point, unordered.
+fn centreline_csv(ridge: &[RidgePoint]) -> String {
+    let mut text = String::from("x,y,direction_x,direction_y,width_px,probability\n");
+    for RidgePoint { x, y, direction: [dx, dy], width_px, value } in ridge {
+        text += &format!("{x:.4},{y:.4},{dx:.4},{dy:.4},{width_px:.3},{value:.4}\n");
+    }
+    text
 }
 
 /// The image in grey from its darkest to its brightest pixel, the skeleton in red.
