@@ -1,6 +1,7 @@
 //! What each step of `accurate` mode on masks buys: one step off at a time.
 //!
-//! `cargo run --release -p accurate3d --example ablation -- [cases] [seed]` prints a Markdown table;
+//! `cargo run --release -p accurate3d --example ablation -- [cases] [seed] [part of a step's name]`
+//! prints a Markdown table;
 //! distances in world units (about 1 px), point to polyline, both ways.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
 
@@ -15,9 +16,10 @@ fn main() {
     let mut args = std::env::args().skip(1);
     let cases: u64 = args.next().map_or(100, |a| a.parse().expect("number of cases"));
     let seed: u64 = args.next().map_or(7, |a| a.parse().expect("seed"));
+    let only = args.next().unwrap_or_default();
     println!("| step off | family | below 5 px | Overall median | Hausdorff median |");
     println!("|---|---|---:|---:|---:|");
-    for (name, params) in variants() {
+    for (name, params) in variants().into_iter().filter(|(name, _)| name.contains(&only)) {
         for family in [Family::Easy, Family::Medium, Family::Hard] {
             let scores: Vec<Option<(f64, f64)>> = (0..cases)
                 .into_par_iter()
@@ -55,6 +57,7 @@ fn variants() -> Vec<(&'static str, Params)> {
             }),
         ),
         ("convergence before the last choice", with(|r| r.finalists = 1)),
+        ("likelihood: the best score is taken", with(|r| r.contenders = 0.0)),
         ("repair of ends and uncovered outline", with(|r| r.repaired = 0)),
         ("a second look in doubt", with(|r| r.second_look = SecondLook::Never)),
         ("the walks' own cost in the choice", with(|r| r.walk_weight = 0.0)),

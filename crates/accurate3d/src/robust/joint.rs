@@ -28,6 +28,9 @@ pub struct RobustParams {
     pub clear_lead: f64,
     /// Fits that are carried to convergence before the last choice.
     pub finalists: usize,
+    /// Finalists whose scores are no more than this behind the best are compared by likelihood; 0: the
+    /// best score decides.
+    pub contenders: f64,
     /// Finalists that are repaired if none is good.
     pub repaired: usize,
     /// A fit is good if it leaves less than this unexplained or outside.
@@ -71,6 +74,7 @@ impl RobustParams {
         enough_fits: 12,
         clear_lead: 1.5,
         finalists: 6,
+        contenders: 10.0,
         repaired: 2,
         good_unexplained: 0.03,
         good_chi_per_point: 0.062,
@@ -106,8 +110,6 @@ pub(crate) struct JointResult {
 
 /// Curves nowhere farther apart than this do not compete, px.
 const RIVAL_PX: f64 = 5.0;
-/// Finalists whose scores are no more than this behind the best may turn out likelier.
-const CONTENDER: f64 = 10.0;
 
 /// Proposes, pairs, fits, judges; by the probability maps behind the masks, where they are given.
 ///
@@ -190,7 +192,8 @@ impl Settled {
         view2: &ViewCandidates<View2>,
     ) -> Self {
         let least = choice.finalists[0].score;
-        let contenders = choice.finalists.iter().take_while(|c| c.score <= least + CONTENDER);
+        let contenders =
+            choice.finalists.iter().take_while(|c| c.score <= least + search.params.contenders);
         let (mut fits, mut calibrations): (Vec<_>, Vec<_>) =
             contenders.map(|c| search.last_fit(c, given_rig)).unzip();
         let first = (0..fits.len())
