@@ -172,9 +172,9 @@ const rivals = data.candidates;
 if (rivals.length) {
   byId("choice-text").textContent = rivals.length === 1
     ? "One curve came to the last choice; no other explained the outlines."
-    : "Each row is a pair of walks through the two skeletons that was fitted to both outlines and came to the last choice. The least score wins. Point at a row to see it dashed in both views.";
+    : "Each row is a pair of walks through the two skeletons that was fitted to both outlines and came to the last choice. The likeliest of those with a score near the least wins (the one with the least unlikeliness: bends weighed by how the body bends elsewhere). Point at a row to see it dashed in both views.";
   const columns = [["", (c, i) => (i === 0 ? "chosen" : "")], ["walks, view 1 / view 2", (c) => `${c.walks[0] + 1} / ${c.walks[1] + 1}${c.reversed ? ", reversed" : ""}`],
-    ["score", (c) => number(c.score, 4)], ["outline unexplained", (c) => number(c.unexplained, 2)], ["outside mask", (c) => number(c.outside, 2)],
+    ["score", (c) => number(c.score, 4)], ["unlikeliness", (c) => c.unlikeliness === null ? "" : number(c.unlikeliness, 4)], ["outline unexplained", (c) => number(c.unexplained, 2)], ["outside mask", (c) => number(c.outside, 2)],
     ["mean squared residual, px²", (c) => number(c.chi_per_point, 3)], ["epipolar disagreement, px", (c) => number(c.mean_distance_px, 2)]];
   byId("candidates").querySelector("thead").append(element("tr", {}, ...columns.map(([name]) => element("th", {}, name))));
   rivals.forEach((c, i) => {

@@ -123,6 +123,7 @@ fn candidate(c: &ConsideredCurve, rig: &Rig) -> Value {
         "walks": c.walks,
         "reversed": c.reversed,
         "score": c.score,
+        "unlikeliness": c.unlikeliness,
         "unexplained": c.unexplained,
         "outside": c.outside,
         "chi_per_point": c.chi_per_point,
