@@ -43,8 +43,8 @@ pub struct RobustParams {
     /// Weight of the walks' own cost in the final choice.
     pub walk_weight: f64,
     /// Whether a pair from images is judged by the probability maps themselves, and walks are led
-    /// over gaps by them; else by the masks alone. Off: on networks' maps its gain is not measured
-    /// yet (`examples/probability_study.rs` does).
+    /// over gaps by them; else by the masks alone. Off: on the built-in network's maps it places curves
+    /// better, but where strays hang on the body it leads some astray (docs/segmentation.md).
     pub by_probability: bool,
     /// How wrong the calibration of view 2 may be; `None`: it is exact. Else a shift of image 2 and a
     /// roll of its camera are unknowns, and the search is repeated with the rig so corrected.
