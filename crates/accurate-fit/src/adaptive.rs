@@ -4,6 +4,7 @@ use accurate_geom::{Curve3, Rig};
 use crate::boundary_fit::{finish, run};
 use crate::judgement::judge;
 use crate::minimise::{Minimiser, Priors};
+use crate::occam::occam;
 use crate::outline_params::{SmoothnessScale, final_settings};
 use crate::outline_problem::Settings;
 use crate::pool::Pool;
@@ -39,6 +40,11 @@ impl AdaptiveParams {
         max_unexplained: 0.05,
         min_knot_spacing_px: 4.0,
     };
+
+    /// Variance of a residual, px².
+    pub(crate) const fn variance_px2(&self) -> f64 {
+        self.noise_inflation / 18.0
+    }
 
     pub(crate) fn validate(&self) -> Result<(), FitError> {
         for (name, value) in
@@ -125,7 +131,7 @@ fn fit_with_knots(
     let (problem, spline) = pose(start, outlines, rig, params.knot_spacing_px)?;
     let (mut minimiser, steps, converged) = run(problem, spline, params, priors)?;
     let (more, inverse) = smooth(&mut minimiser, params, adaptive)?;
-    let variance = adaptive.noise_inflation / 18.0;
+    let variance = adaptive.variance_px2();
     let nuisance = minimiser.current.state.nuisance;
     let nuisance_covariance = if priors.nuisance_weights.is_some() {
         let first = 3 * minimiser.current.state.spline.control.len() + 2;
@@ -149,20 +155,15 @@ fn surprise(
     let Minimiser { problem, current, .. } = minimiser;
     let spline = &current.state.spline;
     let settings = final_settings(params, &SmoothnessScale::new(spline, problem.px_per_unit));
-    let variance = adaptive.noise_inflation / 18.0;
+    let variance = adaptive.variance_px2();
     // A boundary point that is no datum counts as one of the size of the noise, or leaving points out
     // would pay.
     let points = problem.outlines.iter().map(|outline| outline.points.len()).sum::<usize>();
     let used = current.rows.iter().filter(|row| row.held && !row.outside).count();
     let unused = points.saturating_sub(used) as f64 / adaptive.noise_inflation;
     let cost = problem.cost(current, &settings) / variance + unused;
-    // The prior's own measure; what it leaves open (9 unknowns) is the same in every fit.
-    let prior: f64 = (0..spline.spans())
-        .map(|k| problem.local_smoothness.get(k).copied().unwrap_or(1.0))
-        .map(|factor| 3.0 * (settings.lambda3 * factor / variance).ln())
-        .sum();
-    let unknowns = 3.0 * spline.control.len() as f64;
-    cost - prior + inverse.log_determinant() - unknowns * variance.ln()
+    let factors = &problem.local_smoothness;
+    cost + occam(inverse, spline.control.len(), variance, settings.lambda3, factors)
 }
 
 /// Alternates smoothness and curve; returns the steps taken and the inverse of the final normal
@@ -178,9 +179,10 @@ pub(crate) fn smooth(
     let spacing_px = spline.length(8) * minimiser.problem.px_per_unit / spline.spans() as f64;
     let pool = Pool::new(adaptive.window_px / spacing_px, windows);
     let settings = final_settings(params, &scale);
-    let variance = adaptive.noise_inflation / 18.0;
+    let variance = adaptive.variance_px2();
 
     let mut factors = vec![1.0; windows];
+    minimiser.problem.local_smoothness.clone_from(&factors);
     minimiser.refresh(&settings)?;
     let allowed =
         judge(&minimiser.problem, &minimiser.current).unexplained + adaptive.max_unexplained;

@@ -141,7 +141,7 @@ pub fn fit_outlines_and_calibration(
     params.validate()?;
     adaptive.validate()?;
     priors.validate()?;
-    let weights = priors.weights(adaptive.noise_inflation / 18.0);
+    let weights = priors.weights(adaptive.variance_px2());
     let priors = Priors { nuisance_weights: Some(weights) };
     let found = fit_posterior(start, outlines, rig, params, adaptive, priors)?;
     let calibration = CalibrationEstimate::new(

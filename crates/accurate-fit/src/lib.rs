@@ -12,6 +12,7 @@ mod error;
 mod judgement;
 mod minimise;
 mod normal;
+mod occam;
 mod outline;
 mod outline_map;
 mod outline_params;

@@ -4,6 +4,7 @@ use accurate_geom::{Curve3, Pixel, Rig, View1, View2};
 use crate::covariance::CurveCovariance;
 use crate::curve::{from_curve, to_curve};
 use crate::normal::{NormalEquations, THIRD_DIFFERENCE};
+use crate::occam::occam;
 use crate::outline_params::SmoothnessScale;
 use crate::point_data::{Matched, PointData, matched};
 use crate::point_problem::{
@@ -329,16 +330,9 @@ impl<'a> Fitter<'a> {
         let cost = self.problem.cost(&self.current, &self.current.rows, &self.settings) / variance
             + unused / params.noise_inflation;
         let scale = rows / params.noise_inflation * variance.ln();
-        // The prior's own measure; what it leaves open (9 unknowns) is the same in every fit.
-        let prior: f64 = self
-            .problem
-            .local_smoothness
-            .iter()
-            .map(|factor| 3.0 * (self.settings.lambda3 * factor / variance).ln())
-            .sum();
-        let unknowns = 3.0 * self.current.state.spline.control.len() as f64;
-        let posterior = inverse.log_determinant() - unknowns * variance.ln();
-        cost + scale - prior + posterior
+        let controls = self.current.state.spline.control.len();
+        let factors = &self.problem.local_smoothness;
+        cost + scale + occam(inverse, controls, variance, self.settings.lambda3, factors)
     }
 
     fn finish(

@@ -2,6 +2,7 @@ use imageproc::distance_transform::euclidean_squared_distance_transform;
 use ndarray::Array2;
 
 use crate::components::to_image;
+use crate::median::median;
 use crate::{Mask, SegError, zhang_suen};
 
 /// Euclidean distance of each foreground pixel to the nearest background pixel, px, centre to
@@ -45,13 +46,10 @@ pub fn distance_to_background(mask: &Mask) -> Result<Array2<f64>, SegError> {
 pub fn median_width_px(mask: &Mask) -> Result<f64, SegError> {
     mask.require_foreground()?;
     let distances = distance_to_background(mask)?;
-    let mut on_skeleton: Vec<f64> =
+    let on_skeleton =
         zhang_suen(mask).foreground().map(|(row, col)| distances[[row, col]]).collect();
-    on_skeleton.sort_unstable_by(f64::total_cmp);
     // Thinning never erases a component, so there is at least one value.
-    let upper = on_skeleton[on_skeleton.len() / 2];
-    let lower = on_skeleton[(on_skeleton.len() - 1) / 2];
-    Ok(lower + upper - 1.0)
+    Ok(median(on_skeleton).map_or(0.0, |distance| 2.0 * distance - 1.0))
 }
 
 #[cfg(test)]

@@ -54,12 +54,7 @@ pub fn gap_hints(
     mask: &Mask,
     params: &GapParams,
 ) -> Result<Vec<GapHint>, SegError> {
-    if probability.dim() != mask.shape() {
-        return Err(SegError::WrongShape { expected: mask.shape(), found: probability.dim() });
-    }
-    if let Some(((row, column), value)) = probability.indexed_iter().find(|(_, p)| !p.is_finite()) {
-        return Err(SegError::NotFinite { row, column, value: *value });
-    }
+    mask.require_map(probability)?;
     if mask.is_empty() {
         return Ok(Vec::new());
     }

@@ -34,6 +34,7 @@ mod distance;
 mod error;
 mod gap_hints;
 mod mask;
+mod median;
 #[cfg(feature = "network")]
 pub mod network;
 mod post_processing;

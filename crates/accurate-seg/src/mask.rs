@@ -3,6 +3,7 @@ use std::fmt;
 use ndarray::{Array2, Axis};
 
 use crate::SegError;
+use crate::threshold::require_finite;
 
 /// A binary image with at least one pixel: `true` is foreground.
 ///
@@ -95,6 +96,17 @@ impl Mask {
             return Err(SegError::EmptyMask { height: self.height(), width: self.width() });
         }
         Ok(())
+    }
+
+    /// Refuses a map of other pixels than the mask's, or one that is not finite everywhere.
+    ///
+    /// # Errors
+    /// [`SegError::WrongShape`], [`SegError::NotFinite`].
+    pub(crate) fn require_map(&self, map: &Array2<f32>) -> Result<(), SegError> {
+        if map.dim() != self.shape() {
+            return Err(SegError::WrongShape { expected: self.shape(), found: map.dim() });
+        }
+        require_finite(map)
     }
 
     /// Foreground pixels as `(row, col)` in raster order: row by row, left to right.

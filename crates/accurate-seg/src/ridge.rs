@@ -1,5 +1,6 @@
 use ndarray::Array2;
 
+use crate::median::median;
 use crate::{Mask, SegError};
 
 /// A point of a sub-pixel centreline.
@@ -61,23 +62,14 @@ pub fn ridge_centreline(
     skeleton: &Mask,
     params: &RidgeParams,
 ) -> Result<Vec<RidgePoint>, SegError> {
-    if map.dim() != skeleton.shape() {
-        return Err(SegError::WrongShape { expected: skeleton.shape(), found: map.dim() });
-    }
-    if let Some(((row, column), value)) = map.indexed_iter().find(|(_, p)| !p.is_finite()) {
-        return Err(SegError::NotFinite { row, column, value: *value });
-    }
-    let pixels = skeleton.as_array().indexed_iter().filter(|(_, is)| **is);
-    Ok(pixels.filter_map(|((row, column), _)| ridge_at(map, column, row, params)).collect())
+    skeleton.require_map(map)?;
+    let pixels = skeleton.foreground();
+    Ok(pixels.filter_map(|(row, column)| ridge_at(map, column, row, params)).collect())
 }
 
 /// The median width of a centreline, px; `None` without points.
 pub fn median_ridge_width_px(points: &[RidgePoint]) -> Option<f64> {
-    let mut widths: Vec<f64> = points.iter().map(|point| point.width_px).collect();
-    widths.sort_by(f64::total_cmp);
-    let (low, high) =
-        (widths.get(widths.len().checked_sub(1)? / 2)?, widths.get(widths.len() / 2)?);
-    Some(0.5 * (low + high))
+    median(points.iter().map(|point| point.width_px).collect())
 }
 
 /// Of a line, the second derivative along it is small beside the one across.

@@ -131,7 +131,9 @@ pub fn otsu_level(image: &Array2<f32>) -> Result<f32, SegError> {
     Ok(best_level)
 }
 
-fn require_finite(image: &Array2<f32>) -> Result<(), SegError> {
+/// # Errors
+/// [`SegError::NotFinite`] with the position of the first NaN or infinite pixel.
+pub(crate) fn require_finite(image: &Array2<f32>) -> Result<(), SegError> {
     // The indexed search is slow; it runs only when the plain pass has found something.
     if image.iter().fold(true, |all, value| all & value.is_finite()) {
         return Ok(());

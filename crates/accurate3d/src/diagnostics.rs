@@ -157,7 +157,7 @@ impl Diagnostics {
                 unexplained: judgement.unexplained,
                 outside: judgement.outside,
                 chi_per_point: judgement.chi_per_point(),
-                margin: result.margin.is_finite().then_some(result.margin),
+                margin: result.evidence.margin,
                 fits: result.fits,
                 strays_px,
                 evidence: result.evidence,

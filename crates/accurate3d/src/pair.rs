@@ -26,16 +26,29 @@ pub struct ViewPair {
     pub truth: Option<Vec<Point3>>,
 }
 
+impl ViewPair {
+    /// Two cameras that show nothing yet: `ViewPair { masks, ..ViewPair::new(id, rig) }`.
+    pub fn new(id: impl Into<String>, rig: Rig) -> Self {
+        Self {
+            id: id.into(),
+            rig,
+            points: None,
+            masks: None,
+            images: None,
+            probabilities: None,
+            truth: None,
+        }
+    }
+}
+
 impl From<Pair> for ViewPair {
     fn from(pair: Pair) -> Self {
         Self {
-            id: pair.case_id,
-            rig: pair.rig,
             points: pair.points,
             masks: pair.masks,
             images: pair.images,
-            probabilities: None,
             truth: pair.truth,
+            ..Self::new(pair.case_id, pair.rig)
         }
     }
 }
@@ -44,13 +57,10 @@ impl From<SynthCase> for ViewPair {
     /// Takes the rounded points: the paper's protocol for its "Points" rows.
     fn from(case: SynthCase) -> Self {
         Self {
-            id: case.id,
-            rig: case.rig,
             points: Some(case.rounded_points),
             masks: Some(case.masks),
-            images: None,
-            probabilities: None,
             truth: Some(case.truth),
+            ..Self::new(case.id, case.rig)
         }
     }
 }

@@ -55,8 +55,7 @@ fn seen<V: View>(camera: &Camera, points: &[Point3], whole: bool) -> Vec<Pixel<V
 }
 
 fn pair(rig: &Rig, points: Option<OrderedPoints>, masks: Option<[Array2<bool>; 2]>) -> ViewPair {
-    let id = "ordered-points".to_owned();
-    ViewPair { id, rig: rig.clone(), points, masks, images: None, probabilities: None, truth: None }
+    ViewPair { points, masks, ..ViewPair::new("ordered-points", rig.clone()) }
 }
 
 fn accurate(pair: &ViewPair, input: InputKind) -> Result<Reconstruction, Error> {

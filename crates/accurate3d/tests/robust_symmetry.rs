@@ -44,15 +44,7 @@ impl Turn {
 }
 
 fn curve(rig: &Rig, masks: [Array2<bool>; 2]) -> Vec<Point3> {
-    let pair = ViewPair {
-        id: "symmetry".to_owned(),
-        rig: rig.clone(),
-        points: None,
-        masks: Some(masks),
-        images: None,
-        probabilities: None,
-        truth: None,
-    };
+    let pair = ViewPair { masks: Some(masks), ..ViewPair::new("symmetry", rig.clone()) };
     reconstruct(&pair, &Params::new(InputKind::Mask, Method::Accurate)).unwrap().positions()
 }
 

@@ -102,15 +102,8 @@ fn branches_of_the_phantom_come_back_near_the_floor_of_their_skeletons() {
                     eprintln!("{first}+{second}, branch {}: not seen by the masks", index + 1);
                     continue;
                 }
-                let pair = ViewPair {
-                    id: format!("branch-{}", index + 1),
-                    rig: rig.clone(),
-                    points: Some(points),
-                    masks: None,
-                    images: None,
-                    probabilities: None,
-                    truth: None,
-                };
+                let id = format!("branch-{}", index + 1);
+                let pair = ViewPair { points: Some(points), ..ViewPair::new(id, rig.clone()) };
                 let curve = reconstruct(&pair, &Params::new(InputKind::Points, method)).unwrap();
                 let positions = curve.positions();
                 let scores = curve_scores(&positions, branch, 0.2).unwrap();

@@ -2,6 +2,7 @@ use ndarray::Array2;
 
 use super::Normalisation;
 use crate::SegError;
+use crate::threshold::require_finite;
 
 /// Whether the body is darker or brighter than its surroundings in the grey values as stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -28,9 +29,7 @@ pub(super) fn normalise(
     let Some(&first) = image.first() else {
         return Err(SegError::EmptyImage { height, width });
     };
-    if let Some(((row, column), &value)) = image.indexed_iter().find(|(_, v)| !v.is_finite()) {
-        return Err(SegError::NotFinite { row, column, value });
-    }
+    require_finite(image)?;
     let (least, greatest) =
         image.iter().fold((first, first), |(lo, hi), &v| (lo.min(v), hi.max(v)));
     if least == greatest {

@@ -152,8 +152,9 @@ pub fn diagnose(
         {
             let turns = turns::of_curves(curves, *px, &mended);
             turning_places = Some(turns.len());
-            let known = findings.iter().any(is_of_pixels);
-            if let Some((finding, h)) = displaced_pixels(&mended, turns).filter(|_| !known) {
+            if !findings.iter().any(is_of_pixels)
+                && let Some((finding, h)) = displaced_pixels(&mended, turns)
+            {
                 now = evidence.explained_by(&h.cameras);
                 mended = h.cameras;
                 findings.push(finding);

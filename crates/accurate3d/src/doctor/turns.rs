@@ -1,4 +1,3 @@
-use accurate_geom::nalgebra::Point2 as P2;
 use accurate_geom::{
     AngleSample, Camera, EpipolarAngle, LengthUnit, Pixel, Point2, Rig, View1, View2,
 };
@@ -37,7 +36,7 @@ pub(super) fn of_curves(
     curves
         .iter()
         .flat_map(|pair| of_pair(pair, px, &rig).unwrap_or_default())
-        .map(|pair| pair.map(|p| P2::from(p.coords * px)))
+        .map(|pair| pair.map(|p| Point2::from(p.coords * px)))
         .collect()
 }
 

@@ -94,9 +94,6 @@ pub(crate) struct JointResult {
     pub(crate) coverage: [f64; 2],
     /// Mean Sampson distance of the chosen walks' alignment, px.
     pub(crate) mean_distance_px: f64,
-    /// How much less likely the likeliest other curve is, on the scale of a score; infinite if there
-    /// is none.
-    pub(crate) margin: f64,
     pub(crate) fits: usize,
     /// What the curve says about the calibration of view 2, if asked.
     pub(crate) calibration: Option<CalibrationEstimate>,
@@ -129,13 +126,15 @@ pub(crate) fn reconstruct_masks(
     let outlines = OutlinePair::new(&outline1, &outline2)
         .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));
     let mut search = Search { outlines: &outlines, rig, params, case, effort: Effort::Quick };
-    let choice = choose(&search, &mut view1, &mut view2, None)?;
-    let mut result = Settled::of(&search, choice, rig, &view1, &view2);
+    let mut settle = |search: &Search<'_>, earlier| -> Result<Settled, Error> {
+        let choice = choose(search, &mut view1, &mut view2, earlier)?;
+        Ok(Settled::of(search, choice, rig, &view1, &view2))
+    };
+    let mut result = settle(&search, None)?;
     let corrected = result.calibration.as_ref().and_then(|found| found.correct(rig).ok());
     if let Some(corrected) = &corrected {
         search.rig = corrected;
-        let choice = choose(&search, &mut view1, &mut view2, None)?;
-        result = Settled::of(&search, choice, rig, &view1, &view2);
+        result = settle(&search, None)?;
     }
     let again = match params.second_look {
         SecondLook::Never => false,
@@ -144,10 +143,9 @@ pub(crate) fn reconstruct_masks(
     };
     if again {
         search.effort = Effort::Thorough;
-        let choice = choose(&search, &mut view1, &mut view2, Some(result.choice))?;
-        result = Settled::of(&search, choice, rig, &view1, &view2);
+        result = settle(&search, Some(result.choice))?;
     }
-    let Settled { choice, mut fits, margin, calibration, evidence } = result;
+    let Settled { choice, mut fits, calibration, evidence } = result;
     let rivals = &choice.finalists[fits.len()..];
     let candidates = fits.iter().chain(rivals).map(Candidate::considered).collect();
     let best = fits.swap_remove(0);
@@ -161,7 +159,6 @@ pub(crate) fn reconstruct_masks(
         walk2: directed(&view2.walks[j].points, best.reversed),
         coverage,
         mean_distance_px: best.mean_distance_px,
-        margin,
         fits: choice.fits,
         calibration,
         suspicions: suspicions(&evidence),
@@ -175,7 +172,6 @@ struct Settled {
     choice: Choice,
     /// Of the finalists that are close, the likeliest first, as in `choice`.
     fits: Vec<Candidate>,
-    margin: f64,
     calibration: Option<CalibrationEstimate>,
     evidence: Evidence,
 }
@@ -215,7 +211,7 @@ impl Settled {
         walks.add(&view1.walks, i, view1.cut_ends(i).len() / 2);
         walks.add(&view2.walks, j, view2.cut_ends(j).len() / 2);
         let evidence = Evidence::new(fit, &choice.finalists[0].shape, margin, &walks, given_rig);
-        Self { fits, margin, calibration: calibrations.swap_remove(first), evidence, choice }
+        Self { fits, calibration: calibrations.swap_remove(first), evidence, choice }
     }
 }
 

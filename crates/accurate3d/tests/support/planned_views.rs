@@ -91,15 +91,7 @@ pub fn expected_and_draws(
             let mut noise = Noise(1000 + 7919 * (index * draws + draw) as u64);
             let points =
                 (seen(&line, rig.camera1(), &mut noise), seen(&line, rig.camera2(), &mut noise));
-            let pair = ViewPair {
-                id: "planned".into(),
-                rig: rig.clone(),
-                points: Some(points),
-                masks: None,
-                images: None,
-                probabilities: None,
-                truth: None,
-            };
+            let pair = ViewPair { points: Some(points), ..ViewPair::new("planned", rig.clone()) };
             let params = Params::new(InputKind::Points, Method::Accurate);
             let curve = reconstruct(&pair, &params).unwrap();
             errors.push(curve_scores(&curve.positions(), shape, 0.2).unwrap().overall);
