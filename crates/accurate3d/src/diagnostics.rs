@@ -41,7 +41,8 @@ pub struct Diagnostics {
     /// How well the adjusted curve explains ordered points, if it was adjusted to them.
     pub points_fit: Option<PointsDiagnostics>,
     /// By how much a match in the other direction costs more per point, px, where both were tried:
-    /// the confidence in [`view2_reversed`](Self::view2_reversed).
+    /// the confidence in [`view2_reversed`](Self::view2_reversed). Negative where the match left the
+    /// direction open and the fits chose the dearer one.
     pub direction_margin_px: Option<f64>,
     /// Whether the curve is closed; its last point then repeats its first.
     pub closed: bool,
