@@ -18,6 +18,7 @@ use accurate3d::fit::{
 use accurate3d::geom::{Curve3, Point3, Rig, View1, View2};
 use accurate3d::synth::{CalibrationError, CaseOptions, Family, generate};
 use accurate3d::{InputKind, Method, Params, SecondLook, ViewPair, reconstruct};
+use ndarray::Array2;
 use rayon::prelude::*;
 
 struct Line {
@@ -145,6 +146,15 @@ fn study(
         if hausdorff_px > 5.0 { " WRONG" } else { "" },
         if suspect { format!(" suspect {:?}", d.suspicions) } else { String::new() },
     );
+    let text = if hausdorff_px > 3.0 {
+        format!(
+            "{text}\n      truth {}\n      curve {}",
+            farthest(&truth, &curve, &rig, [&mask1, &mask2], unit_per_px)?,
+            farthest(&curve, &truth, &rig, [&mask1, &mask2], unit_per_px)?
+        )
+    } else {
+        text
+    };
     Ok(Line {
         text,
         hausdorff_px,
@@ -153,6 +163,31 @@ fn study(
         seconds,
         suspect,
     })
+}
+
+/// Where `from` is farthest from `to`: part of its length, distance, and what each view shows there.
+fn farthest(
+    from: &[Point3],
+    to: &[Point3],
+    rig: &Rig,
+    masks: [&Array2<bool>; 2],
+    unit_per_px: f64,
+) -> Result<String, Box<dyn Error + Send + Sync>> {
+    let nearest = |p: &Point3| to.iter().map(|q| (p - q).norm()).fold(f64::INFINITY, f64::min);
+    let (k, distance) = from
+        .iter()
+        .map(nearest)
+        .enumerate()
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .ok_or("an empty curve")?;
+    let mut text =
+        format!("at {:.3}: {:.2} px", k as f64 / from.len() as f64, distance / unit_per_px);
+    for (camera, mask) in [rig.camera1(), rig.camera2()].into_iter().zip(masks) {
+        let p = camera.project(&from[k])?;
+        let shown = mask.get([p.y.round() as usize, p.x.round() as usize]) == Some(&true);
+        text += &format!(", ({:.0}, {:.0}) {}", p.x, p.y, if shown { "seen" } else { "hidden" });
+    }
+    Ok(text)
 }
 
 fn world_per_px(rig: &Rig, truth: &[Point3]) -> f64 {

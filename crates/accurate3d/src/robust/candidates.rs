@@ -1,11 +1,12 @@
 use accurate_fit::Outline;
+use accurate_geom::nalgebra::Vector2;
 use accurate_geom::{Pixel, View};
 use accurate_match::{FreeEnds, SignalCurve};
 use accurate_seg::{
     GapHint, GapParams, Mask, distance_to_background, gap_hints, median_width_px, zhang_suen,
 };
 use accurate_traverse::{
-    GraphParams, HalfEdge, SkeletonGraph, Walk, WalkEnd, WalkParams, fill_small_holes,
+    GraphEdge, GraphParams, HalfEdge, SkeletonGraph, Walk, WalkEnd, WalkParams, fill_small_holes,
     k_best_walks_with_reward,
 };
 use ndarray::Array2;
@@ -82,7 +83,8 @@ impl<V: View> ViewCandidates<V> {
             .edges()
             .iter()
             .filter(|edge| edge.link)
-            .flat_map(|edge| edge.points.windows(2).map(|w| (shifted(&w[0]), shifted(&w[1]))))
+            .flat_map(|edge| edge.points.windows(2).map(|w| (w[0], w[1])).chain(turn(&graph, edge)))
+            .map(|(a, b)| (shifted(&a), shifted(&b)))
             .collect();
         let mut hinted_ends = Vec::new();
         for hint in &hints {
@@ -181,6 +183,39 @@ impl<V: View> ViewCandidates<V> {
             })
             .collect()
     }
+}
+
+/// Where the body may turn out of sight: straight on from both ends of a link whose strands run side
+/// by side, and across. A hairpin's turn hidden by something lies farther off than the link.
+fn turn<V: View>(graph: &SkeletonGraph<V>, link: &GraphEdge<V>) -> Vec<(Pixel<V>, Pixel<V>)> {
+    /// No farther ahead, px: what hides the body hides no more of it.
+    const AHEAD_PX: f64 = 14.0;
+    /// Over so many points the direction of an end is taken.
+    const OVER: usize = 10;
+    /// Strands that point away from each other, by this cosine and less, are joined by the link itself.
+    const APART: f64 = -0.3;
+    let ahead = |node: usize| {
+        let mut strands =
+            graph.edges().iter().filter(|edge| !edge.link && edge.ends.contains(&node));
+        let (strand, None) = (strands.next()?, strands.next()) else { return None };
+        let last = strand.points.len() - 1;
+        let (tip, before) = if strand.ends[0] == node {
+            (strand.points[0], strand.points[OVER.min(last)])
+        } else {
+            (strand.points[last], strand.points[last.saturating_sub(OVER)])
+        };
+        (tip.point() - before.point()).try_normalize(0.0).map(|way| (tip, way))
+    };
+    let (Some((tip1, way1)), Some((tip2, way2))) = (ahead(link.ends[0]), ahead(link.ends[1]))
+    else {
+        return Vec::new();
+    };
+    if way1.dot(&way2) < APART {
+        return Vec::new();
+    }
+    let on = |tip: Pixel<V>, way: Vector2<f64>| Pixel::from(tip.point() + way * AHEAD_PX);
+    let (far1, far2) = (on(tip1, way1), on(tip2, way2));
+    vec![(tip1, far1), (tip2, far2), (far1, far2), (tip1, far2), (far1, tip2)]
 }
 
 /// A hint as a polyline with a vertex every few pixels, in the whole image.

@@ -64,7 +64,7 @@ pub(crate) struct Candidate {
     /// Index of the walk of each view, and whether the second runs against the first.
     pub(crate) walks: [usize; 2],
     pub(crate) reversed: bool,
-    cuts: CutEnds,
+    pub(crate) cuts: CutEnds,
     pub(crate) fit: OutlineFit,
     pub(crate) shape: Shape,
     /// Settings for carrying the fit on.

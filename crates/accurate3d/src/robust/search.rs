@@ -1,14 +1,14 @@
 use accurate_fit::{
     AdaptiveParams, CalibrationEstimate, OutlineFit, OutlineFitParams, OutlinePair, fit_outlines,
-    fit_outlines_adaptively, fit_outlines_and_calibration,
+    fit_outlines_adaptively, fit_outlines_and_calibration, start_curve,
 };
-use accurate_geom::{Curve3, EpipolarAngle, Pixel, Rig, View, View1, View2};
+use accurate_geom::{Camera, Curve3, EpipolarAngle, Pixel, Point3, Rig, View, View1, View2};
 use accurate_match::{FreeEnds, Proposal, ProposeParams, propose_pairs};
 
 use super::RobustParams;
 use super::candidates::{ViewCandidates, free_ends};
 use super::score::{Candidate, Origin};
-use super::shape::Shape;
+use super::shape::{Shape, dense, px_per_unit};
 use super::start::{OTHER_PRICES, PRICES, start_from};
 use crate::Error;
 
@@ -33,6 +33,9 @@ pub(crate) const FINE: OutlineFitParams =
 const CLEAR: f64 = 5.0;
 /// A score so much worse than a good one's is no rival's.
 const BEHIND: f64 = 10.0;
+
+/// How much around the ends of bridges a restart spans smoothly, px.
+const BRIDGED_PX: [f64; 2] = [12.0, 25.0];
 
 /// Pairs kept at each sieve of the proposals where a good curve is likely among the first; see
 /// [`ProposeParams`].
@@ -214,6 +217,14 @@ impl Search<'_> {
                 self.rig,
                 OutlineFitParams::DEFAULT.knot_spacing_px,
             );
+            for reach_px in BRIDGED_PX {
+                let bridged = self.bridged(candidate, reach_px);
+                if let Some(fit) =
+                    bridged.and_then(|start| self.fit(&start, &OutlineFitParams::DEFAULT))
+                {
+                    more.push(candidate.refitted(fit, self.rig));
+                }
+            }
             let Some((start, _)) = start else { continue };
             if self.effort == Effort::Quick
                 && Shape::new(&start, self.rig).is_along(&candidate.shape, SAME_START_PX)
@@ -227,6 +238,37 @@ impl Search<'_> {
             }
         }
         more
+    }
+
+    /// A start that leaves out what is near the ends of bridges, px in either view, and spans it
+    /// smoothly: the rim of what hides the body may have drawn the fit aside. `None` where there are
+    /// no bridges.
+    fn bridged(&self, candidate: &Candidate, reach_px: f64) -> Option<Curve3> {
+        let (rig, cuts) = (self.rig, &candidate.cuts);
+        if cuts.iter().all(Vec::is_empty) {
+            return None;
+        }
+        let points = dense(&candidate.fit.curve, rig);
+        let px_per_unit = px_per_unit(&points, rig);
+        let near = |camera: &Camera, cuts: &[[f64; 2]], p: &Point3| {
+            camera
+                .project(p)
+                .is_ok_and(|at| cuts.iter().any(|[x, y]| (at.x - x).hypot(at.y - y) < reach_px))
+        };
+        let mut arc_px = 0.0;
+        let mut kept: (Vec<Point3>, Vec<f64>) = Default::default();
+        for (k, point) in points.iter().enumerate() {
+            if k > 0 {
+                arc_px += (point - points[k - 1]).norm() * px_per_unit;
+            }
+            let hidden =
+                near(rig.camera1(), &cuts[0], point) || near(rig.camera2(), &cuts[1], point);
+            if !hidden || k == 0 || k + 1 == points.len() {
+                kept.0.push(*point);
+                kept.1.push(arc_px);
+            }
+        }
+        start_curve(&kept.0, &kept.1, OutlineFitParams::DEFAULT.knot_spacing_px).ok()
     }
 
     /// The candidate with its last, adaptive fit under the given cameras, and what that says about the
