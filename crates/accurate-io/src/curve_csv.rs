@@ -1,3 +1,4 @@
+use std::fmt::Write as _;
 use std::path::Path;
 
 use accurate_geom::{LengthUnit, Point3};
@@ -49,12 +50,17 @@ pub(crate) fn write(path: &Path, curve: &CurveTable) -> Result<(), IoError> {
         if c.unit.is_empty() { c.name.clone() } else { format!("{}[{}]", c.name, c.unit) }
     }));
     writer.write_record(&row).map_err(failed)?;
+    let mut text = String::new();
     for (i, p) in curve.points.iter().enumerate() {
-        row.clear();
-        // `{:?}` is the shortest text that reads back to the same bits.
-        row.extend(p.coords.iter().map(|v| format!("{v:?}")));
-        row.extend(curve.columns.iter().filter_map(|c| c.values.get(i)).map(|v| format!("{v:?}")));
-        writer.write_record(&row).map_err(failed)?;
+        for value in p.iter().chain(curve.columns.iter().filter_map(|c| c.values.get(i))) {
+            text.clear();
+            // `{:?}` is the shortest text that reads back to the same bits.
+            write!(text, "{value:?}")
+                .map_err(|e| IoError::system(path, "encode", std::io::Error::other(e)))?;
+            writer.write_field(&text).map_err(failed)?;
+        }
+        // The end of the row.
+        writer.write_record(None::<&[u8]>).map_err(failed)?;
     }
     let bytes = writer
         .into_inner()
