@@ -5,8 +5,8 @@ use accurate3d::io::{PairParts, Truth, find_pairs, read_pair};
 use accurate3d::seg::Segmenter;
 use accurate3d::synth::Family;
 use accurate3d::table::{
-    CaseSet, CellCheck, Measuring, Outcome, PointsProtocol, Row, accepted_around, check_case_count,
-    check_cells, grid, measure, need_images, paper_rows, parse_cells, render, write_cells,
+    CaseSet, CellCheck, Measuring, Outcome, PointsProtocol, Row, check_case_count, check_cells,
+    grid, measure, need_images, paper_rows, parse_cells, render, write_cells,
 };
 use accurate3d::{InputKind, NOT_FOR_CLINICAL_USE, ViewPair};
 use comfy_table::Table as TerminalTable;
@@ -199,7 +199,7 @@ fn accept(path: &Path, checks: &[CellCheck], console: &Console) -> Result<(), Fa
         let value = check
             .measured
             .ok_or_else(|| bad(format!("nothing was measured for {} {}", cell.row, cell.metric)))?;
-        [cell.low, cell.high] = accepted_around(value).map(Some);
+        cell.accept(value);
     }
     write_text(path, &write_cells(&cells).map_err(bad)?)?;
     console.remark(&format!("{} intervals set in {}", checks.len(), path.display()));

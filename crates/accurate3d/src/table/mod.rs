@@ -7,8 +7,8 @@ mod render;
 mod rows;
 
 pub use cells::{
-    Cell, CellCheck, accepted_around, check_case_count, check_cells, image_cases, need_images,
-    parse_cells, write_cells,
+    Cell, CellCheck, check_case_count, check_cells, image_cases, need_images, parse_cells,
+    write_cells,
 };
 pub use measure::{CaseSet, Figure, Measured, Measuring, PointsProtocol, Table, TableRow, measure};
 pub use render::{Format, grid, render};
