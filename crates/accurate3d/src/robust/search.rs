@@ -199,7 +199,8 @@ impl Search<'_> {
     }
 
     /// The first walk pairs again, matched from corner to corner: some stretches along epipolar lines
-    /// come out otherwise. Without much effort only where that start is another one.
+    /// come out otherwise. Without much effort only where that start is another one. Before that, where
+    /// a walk takes bridges, once more without what lies near them.
     pub(crate) fn restarted(
         &self,
         finalists: &[Candidate],
