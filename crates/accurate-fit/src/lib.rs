@@ -17,6 +17,7 @@ mod outline;
 mod outline_map;
 mod outline_params;
 mod outline_problem;
+mod outside;
 mod point_data;
 mod point_fit;
 mod point_problem;

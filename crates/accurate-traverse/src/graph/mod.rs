@@ -201,7 +201,7 @@ impl<V: View> GraphEdge<V> {
     }
 
     /// The point at index `k` from the end `side` (0: first, 1: last), or the farthest there is.
-    pub(crate) fn near_end(&self, side: usize, k: usize) -> Point2 {
+    pub fn near_end(&self, side: usize, k: usize) -> Point2 {
         let last = self.points.len() - 1;
         let k = k.min(last);
         self.points[if side == 0 { k } else { last - k }].point()

@@ -34,8 +34,9 @@ pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Recons
     }
     let fit_params =
         PointFitParams { calibration: params.robust.calibration, ..PointFitParams::DEFAULT };
+    let whole = whole_pixels(points1) && whole_pixels(points2);
     let matched_and_fitted = |rig| {
-        Curves { points1, points2, rig, given_rig: &pair.rig, fit_params }
+        Curves { points1, points2, whole, rig, given_rig: &pair.rig, fit_params }
             .found()
             .map_err(|source| Error::Matching { case: case(), source })
     };
@@ -104,6 +105,8 @@ const DOUBTFUL_DIRECTION_PX: f64 = 0.02;
 struct Curves<'a> {
     points1: &'a [Pixel<View1>],
     points2: &'a [Pixel<View2>],
+    /// Whether they are whole pixels.
+    whole: bool,
     /// Under which they are matched.
     rig: &'a Rig,
     /// Under which they are fitted.
@@ -130,14 +133,11 @@ impl Curves<'_> {
 
     /// The likeliest fit from several starts in the direction of `matched`.
     fn fitted(&self, matched: FreeMatch) -> Found {
-        let Self { points1, points2, rig, given_rig, fit_params } = self;
+        let Self { points1, points2, rig, given_rig, fit_params, .. } = self;
         let mut directed2 = points2.to_vec();
         if matched.reversed {
             directed2.reverse();
         }
-        let part = MatchedPart::of(&matched, points1.len(), &directed2);
-        let curve1 = &points1[part.range1.clone()];
-        let curve2 = &directed2[part.range2.clone()];
         let mut parts = vec![MatchedPart::of(&matched, points1.len(), &directed2)];
         let tangency = self.tangency();
         for max_sine in OTHER_SINES.into_iter().filter(|sine| *sine < tangency.max_sine) {
@@ -147,6 +147,9 @@ impl Curves<'_> {
                 parts.push(MatchedPart::of(&other, points1.len(), &directed2));
             }
         }
+        let part = &parts[0];
+        let curve1 = &points1[part.range1.clone()];
+        let curve2 = &directed2[part.range2.clone()];
         let doubtful = part.ends.iter().filter(|end| **end == End::Doubtful).count();
         let mut fits = Vec::new();
         for tips in [true, false] {
@@ -154,7 +157,7 @@ impl Curves<'_> {
                 continue;
             }
             let mut starts: Vec<_> = parts.iter().map(|part| part.pairs(tips)).collect();
-            if self.whole_pixels() && tips {
+            if self.whole && tips {
                 starts.extend(smoothed_pairs(curve1, curve2, rig));
             }
             let hidden = part.hidden();
@@ -178,12 +181,8 @@ impl Curves<'_> {
         }
     }
 
-    fn whole_pixels(&self) -> bool {
-        whole_pixels(self.points1) && whole_pixels(self.points2)
-    }
-
     fn tangency(&self) -> TangencyParams {
-        if self.whole_pixels() { TangencyParams::WHOLE_PIXELS } else { TangencyParams::DEFAULT }
+        if self.whole { TangencyParams::WHOLE_PIXELS } else { TangencyParams::DEFAULT }
     }
 }
 

@@ -1,5 +1,4 @@
 use accurate_fit::Outline;
-use accurate_geom::nalgebra::Vector2;
 use accurate_geom::{Pixel, View};
 use accurate_match::{FreeEnds, SignalCurve};
 use accurate_seg::{
@@ -198,13 +197,9 @@ fn turn<V: View>(graph: &SkeletonGraph<V>, link: &GraphEdge<V>) -> Vec<(Pixel<V>
         let mut strands =
             graph.edges().iter().filter(|edge| !edge.link && edge.ends.contains(&node));
         let (strand, None) = (strands.next()?, strands.next()) else { return None };
-        let last = strand.points.len() - 1;
-        let (tip, before) = if strand.ends[0] == node {
-            (strand.points[0], strand.points[OVER.min(last)])
-        } else {
-            (strand.points[last], strand.points[last.saturating_sub(OVER)])
-        };
-        (tip.point() - before.point()).try_normalize(0.0).map(|way| (tip, way))
+        let side = usize::from(strand.ends[0] != node);
+        let (tip, before) = (strand.near_end(side, 0), strand.near_end(side, OVER));
+        (tip - before).try_normalize(0.0).map(|way| (tip, way))
     };
     let (Some((tip1, way1)), Some((tip2, way2))) = (ahead(link.ends[0]), ahead(link.ends[1]))
     else {
@@ -213,9 +208,10 @@ fn turn<V: View>(graph: &SkeletonGraph<V>, link: &GraphEdge<V>) -> Vec<(Pixel<V>
     if way1.dot(&way2) < APART {
         return Vec::new();
     }
-    let on = |tip: Pixel<V>, way: Vector2<f64>| Pixel::from(tip.point() + way * AHEAD_PX);
-    let (far1, far2) = (on(tip1, way1), on(tip2, way2));
-    vec![(tip1, far1), (tip2, far2), (far1, far2), (tip1, far2), (far1, tip2)]
+    let (far1, far2) = (tip1 + way1 * AHEAD_PX, tip2 + way2 * AHEAD_PX);
+    [(tip1, far1), (tip2, far2), (far1, far2), (tip1, far2), (far1, tip2)]
+        .map(|(from, to)| (from.into(), to.into()))
+        .to_vec()
 }
 
 /// A hint as a polyline with a vertex every few pixels, in the whole image.

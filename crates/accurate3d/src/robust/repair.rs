@@ -4,7 +4,7 @@ use accurate_geom::{Curve3, Point3, View1, View2};
 use super::candidates::ViewCandidates;
 use super::score::Candidate;
 use super::search::Search;
-use super::shape::{dense, px_per_unit};
+use super::shape::{arc_lengths_px, dense, px_per_unit};
 use crate::Error;
 
 /// Rounds of repair at most.
@@ -131,13 +131,6 @@ fn with_end_moved(
 
 /// A start for a fit through dense points.
 fn through(points: &[Point3], px_per_unit: f64) -> Option<Curve3> {
-    let mut length = 0.0;
-    let mut arc = Vec::with_capacity(points.len());
-    for (k, point) in points.iter().enumerate() {
-        if k > 0 {
-            length += (point - points[k - 1]).norm() * px_per_unit;
-        }
-        arc.push(length);
-    }
+    let arc = arc_lengths_px(points, px_per_unit);
     start_curve(points, &arc, OutlineFitParams::DEFAULT.knot_spacing_px).ok()
 }

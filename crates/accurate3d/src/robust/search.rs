@@ -8,7 +8,7 @@ use accurate_match::{FreeEnds, Proposal, ProposeParams, propose_pairs};
 use super::RobustParams;
 use super::candidates::{ViewCandidates, free_ends};
 use super::score::{Candidate, Origin};
-use super::shape::{Shape, dense, px_per_unit};
+use super::shape::{Shape, arc_lengths_px, dense, px_per_unit};
 use super::start::{OTHER_PRICES, PRICES, start_from};
 use crate::Error;
 
@@ -256,20 +256,20 @@ impl Search<'_> {
                 .project(p)
                 .is_ok_and(|at| cuts.iter().any(|[x, y]| (at.x - x).hypot(at.y - y) < reach_px))
         };
-        let mut arc_px = 0.0;
-        let mut kept: (Vec<Point3>, Vec<f64>) = Default::default();
-        for (k, point) in points.iter().enumerate() {
-            if k > 0 {
-                arc_px += (point - points[k - 1]).norm() * px_per_unit;
-            }
-            let hidden =
-                near(rig.camera1(), &cuts[0], point) || near(rig.camera2(), &cuts[1], point);
-            if !hidden || k == 0 || k + 1 == points.len() {
-                kept.0.push(*point);
-                kept.1.push(arc_px);
-            }
-        }
-        start_curve(&kept.0, &kept.1, OutlineFitParams::DEFAULT.knot_spacing_px).ok()
+        let last = points.len() - 1;
+        let arc_px = arc_lengths_px(&points, px_per_unit);
+        let (kept, arc_px): (Vec<Point3>, Vec<f64>) = points
+            .iter()
+            .zip(arc_px)
+            .enumerate()
+            .filter(|(k, (point, _))| {
+                let hidden =
+                    near(rig.camera1(), &cuts[0], point) || near(rig.camera2(), &cuts[1], point);
+                !hidden || *k == 0 || *k == last
+            })
+            .map(|(_, (point, arc))| (*point, arc))
+            .unzip();
+        start_curve(&kept, &arc_px, OutlineFitParams::DEFAULT.knot_spacing_px).ok()
     }
 
     /// The candidate with its last, adaptive fit under the given cameras, and what that says about the

@@ -89,6 +89,16 @@ pub(crate) fn dense(curve: &Curve3, rig: &Rig) -> Vec<Point3> {
     curve.sample(length_px.ceil().clamp(8.0, 65_536.0) as usize + 1)
 }
 
+/// Length of the polyline up to each of its points, px.
+pub(crate) fn arc_lengths_px(points: &[Point3], px_per_unit: f64) -> Vec<f64> {
+    let steps = points.windows(2).map(|w| (w[1] - w[0]).norm() * px_per_unit);
+    let lengths = steps.scan(0.0, |length, step| {
+        *length += step;
+        Some(*length)
+    });
+    std::iter::once(0.0).chain(lengths).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
