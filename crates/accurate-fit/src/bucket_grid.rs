@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 /// Side of a bucket, px. The search radius is 5 to 8 px: 4 keeps the searched area close to it.
 const CELL_PX: f64 = 4.0;
 
@@ -45,24 +47,35 @@ impl BucketGrid {
 
     /// Calls `visit` with ranges of sorted points that together hold every point of the box
     /// `[x_min, y_min, x_max, y_max]` (and some more).
-    #[inline]
-    pub(crate) fn for_box(&self, bounds: [f64; 4], mut visit: impl FnMut(std::ops::Range<usize>)) {
+    pub(crate) fn for_box(&self, bounds: [f64; 4], mut visit: impl FnMut(Range<usize>)) {
+        let (rows, columns) = self.buckets_of(bounds);
+        for row in rows {
+            visit(self.points_of(row, &columns));
+        }
+    }
+
+    /// Rows and columns of the buckets of a box.
+    #[inline(always)]
+    pub(crate) fn buckets_of(&self, bounds: [f64; 4]) -> (Range<usize>, Range<usize>) {
         let low = |v: f64, origin: f64| ((v - origin) / CELL_PX).floor().max(0.0) as usize;
         let (c0, r0) = (low(bounds[0], self.x0), low(bounds[1], self.y0));
         let (x1, y1) = ((bounds[2] - self.x0) / CELL_PX, (bounds[3] - self.y0) / CELL_PX);
         // Also refuses NaN.
-        if !(x1 >= 0.0 && y1 >= 0.0) || c0 >= self.columns || r0 >= self.rows {
-            return;
+        if !(x1 >= 0.0 && y1 >= 0.0) {
+            return (0..0, 0..0);
         }
-        let c1 = (x1 as usize).min(self.columns - 1);
-        let r1 = (y1 as usize).min(self.rows - 1);
-        for row in r0..=r1 {
-            let first = self.start[row * self.columns + c0] as usize;
-            let last = self.start[row * self.columns + c1 + 1] as usize;
-            if first < last {
-                visit(first..last);
-            }
+        // Empty if it begins behind the last.
+        (r0..(y1 as usize + 1).min(self.rows), c0..(x1 as usize + 1).min(self.columns))
+    }
+
+    /// The sorted points of some columns of a row of buckets.
+    #[inline(always)]
+    pub(crate) fn points_of(&self, row: usize, columns: &Range<usize>) -> Range<usize> {
+        if columns.is_empty() {
+            return 0..0;
         }
+        let first = row * self.columns;
+        self.start[first + columns.start] as usize..self.start[first + columns.end] as usize
     }
 }
 

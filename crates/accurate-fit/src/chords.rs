@@ -1,7 +1,6 @@
 use accurate_geom::nalgebra::Vector2;
 
 use crate::FitError;
-use crate::outline::OutlineData;
 use crate::projector::Projector;
 use crate::uniform_spline::{UniformSpline, basis};
 
@@ -12,14 +11,6 @@ pub(crate) struct Chords {
     pub(crate) points: Vec<Vector2<f64>>,
     /// Length of the polyline up to each point, px; only if measured.
     arc: Vec<f64>,
-}
-
-/// The nearest point of a projected curve: squared distance (infinite: none within reach) and the
-/// curve parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Nearest {
-    pub(crate) squared: f64,
-    pub(crate) u: f64,
 }
 
 impl Chords {
@@ -110,60 +101,4 @@ impl Chords {
         }
         u.clamp(from, to)
     }
-
-    /// For every outline point the nearest point of the polyline, if nearer than `radius_px`.
-    ///
-    /// Works from the curve's side: each chord visits the outline points around it. The outline's
-    /// grid is built once per image, the curve's would have to be built in every iteration.
-    pub(crate) fn nearest(
-        &self,
-        outline: &OutlineData,
-        radius_px: f64,
-        stride: usize,
-        found: &mut Vec<Nearest>,
-    ) {
-        found.clear();
-        found.resize(outline.points.len(), Nearest { squared: radius_px * radius_px, u: f64::NAN });
-        for (k, pair) in self.points.windows(2).enumerate() {
-            let (a, b) = (pair[0], pair[1]);
-            let e = b - a;
-            let inverse = 1.0 / e.norm_squared().max(f64::MIN_POSITIVE);
-            let bounds = [
-                a.x.min(b.x) - radius_px,
-                a.y.min(b.y) - radius_px,
-                a.x.max(b.x) + radius_px,
-                a.y.max(b.y) + radius_px,
-            ];
-            outline.grid.for_box(bounds, |range| {
-                let points = &outline.points[range.clone()];
-                for ((p, n), i) in points.iter().zip(&mut found[range.clone()]).zip(range) {
-                    if stride > 1 && !is_sampled(i, stride) {
-                        continue;
-                    }
-                    let (dx, dy) = (p[0] - a.x, p[1] - a.y);
-                    let t = ((dx * e.x + dy * e.y) * inverse).clamp(0.0, 1.0);
-                    let (rx, ry) = (dx - t * e.x, dy - t * e.y);
-                    let squared = rx * rx + ry * ry;
-                    if squared < n.squared {
-                        *n = Nearest { squared, u: k as f64 + t };
-                    }
-                }
-            });
-        }
-        let to_u = 1.0 / self.steps as f64;
-        for n in found {
-            if n.u.is_nan() {
-                n.squared = f64::INFINITY;
-            } else {
-                n.u *= to_u;
-            }
-        }
-    }
-}
-
-/// Whether point `i` belongs to the sample of one in `stride`. A plain `i % stride` would take one
-/// side only of a vertical strand, whose points alternate left and right.
-#[inline]
-pub(crate) fn is_sampled(i: usize, stride: usize) -> bool {
-    ((i as u32).wrapping_mul(2_654_435_769) >> 16).is_multiple_of(stride as u32)
 }

@@ -32,25 +32,22 @@ impl DistanceMap {
         const NONE: u32 = u32::MAX;
         let mut row_of = vec![NONE; width * height];
         for y in 0..height {
-            for x in 0..width {
-                let i = y * width + x;
-                if mask[[y0 + y, x0 + x]] {
-                    row_of[i] = y as u32;
-                } else if y > 0 {
-                    row_of[i] = row_of[i - width];
-                }
+            let (above, rest) = row_of.split_at_mut(y * width);
+            let here = &mut rest[..width];
+            if y > 0 {
+                here.copy_from_slice(&above[(y - 1) * width..]);
+            }
+            let pixels = mask.row(y0 + y);
+            for (found, &set) in here.iter_mut().zip(pixels.iter().skip(x0)) {
+                *found = if set { y as u32 } else { *found };
             }
         }
         for y in (0..height.saturating_sub(1)).rev() {
-            for x in 0..width {
-                let i = y * width + x;
-                let below = row_of[i + width];
-                if below != NONE {
-                    let here = row_of[i];
-                    if here == NONE || below.abs_diff(y as u32) < here.abs_diff(y as u32) {
-                        row_of[i] = below;
-                    }
-                }
+            let (rest, below) = row_of.split_at_mut((y + 1) * width);
+            for (here, &below) in rest[y * width..].iter_mut().zip(&below[..width]) {
+                // `NONE` is farther than any row.
+                let nearer = below.abs_diff(y as u32) < here.abs_diff(y as u32);
+                *here = if nearer { below } else { *here };
             }
         }
 
@@ -134,7 +131,8 @@ impl DistanceMap {
         let row = (row as usize).clamp(self.y0, self.y0 + self.height - 1) - self.y0;
         let [qx, qy] = self.nearest[row * self.width + column];
         let found = [f64::from(qx), f64::from(qy)];
-        (found, (found[0] - x).hypot(found[1] - y))
+        let (dx, dy) = (found[0] - x, found[1] - y);
+        (found, (dx * dx + dy * dy).sqrt())
     }
 }
 

@@ -71,7 +71,7 @@ fn excess(problem: &OutlineProblem<'_>, e: &Evaluation, view: usize, i: usize) -
 
 /// Residual of outline point `i` against the nearest point of the curve, whatever the gates say.
 fn residual(e: &Evaluation, view: usize, i: usize) -> f64 {
-    e.nearest[view][i].squared.sqrt() - e.state.half_px[view]
+    e.nearest[view].squared()[i].sqrt() - e.state.half_px[view]
 }
 
 /// `e` must have been evaluated with stride 1.

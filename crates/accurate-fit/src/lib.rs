@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod boundary_fit;
+mod boundary_rows;
 mod bucket_grid;
 mod calibration;
 mod chords;
@@ -11,6 +12,7 @@ mod distance_map;
 mod error;
 mod judgement;
 mod minimise;
+mod nearest;
 mod normal;
 mod occam;
 mod outline;
@@ -25,6 +27,7 @@ mod pool;
 mod pose;
 mod projector;
 mod selected_inverse;
+mod span_blocks;
 mod start;
 mod uniform_spline;
 

@@ -11,6 +11,7 @@ use faer::{Conj, MatMut, Par, Side};
 
 use crate::FitError;
 use crate::selected_inverse::SelectedInverse;
+use crate::span_blocks::{PAIRS, PRODUCT, SpanBlocks};
 
 /// Third difference of four control points.
 pub(crate) const THIRD_DIFFERENCE: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
@@ -30,6 +31,8 @@ pub(crate) struct NormalEquations {
     base: Vec<usize>,
     values: Vec<f64>,
     gradient: Vec<f64>,
+    /// What was added since, span by span.
+    blocks: SpanBlocks,
     /// Scratch of the solver.
     damped: Vec<f64>,
     step: Vec<f64>,
@@ -78,6 +81,7 @@ impl NormalEquations {
             base,
             values: vec![0.0; nnz],
             gradient: vec![0.0; n],
+            blocks: SpanBlocks::new(controls.saturating_sub(3), globals),
             damped: vec![0.0; nnz],
             step: vec![0.0; n],
             factor,
@@ -94,6 +98,7 @@ impl NormalEquations {
     pub(crate) fn clear(&mut self) {
         self.values.fill(0.0);
         self.gradient.fill(0.0);
+        self.blocks.clear();
     }
 
     #[inline]
@@ -103,7 +108,7 @@ impl NormalEquations {
 
     /// Adds `weight / 2 * residual²` whose gradient with respect to control point `span + k` is
     /// `basis[k] * gradient`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn add(
         &mut self,
         span: usize,
@@ -112,26 +117,12 @@ impl NormalEquations {
         residual: f64,
         weight: f64,
     ) {
-        let mut row = [0.0; 12];
-        for k in 0..4 {
-            for axis in 0..3 {
-                row[3 * k + axis] = basis[k] * gradient[axis];
-            }
-        }
-        let first = 3 * span;
-        for (c, &value) in row.iter().enumerate() {
-            let scaled = weight * value;
-            self.gradient[first + c] += scaled * residual;
-            let start = self.base[first + c].wrapping_add(first);
-            let column = &mut self.values[start..=start + c];
-            for (entry, &other) in column.iter_mut().zip(&row) {
-                *entry += scaled * other;
-            }
-        }
+        self.blocks.add(span, basis, gradient, &[], residual, weight);
     }
 
     /// As [`NormalEquations::add`], for a residual that also depends on the global unknowns, with
     /// the derivatives `global`.
+    #[inline(always)]
     pub(crate) fn add_with_globals(
         &mut self,
         span: usize,
@@ -141,7 +132,7 @@ impl NormalEquations {
         residual: f64,
         weight: f64,
     ) {
-        self.add(span, basis, gradient, residual, weight);
+        self.blocks.add(span, basis, gradient, global, residual, weight);
         let first_global = 3 * self.controls;
         for (b, &value) in global.iter().enumerate() {
             if value == 0.0 {
@@ -150,15 +141,39 @@ impl NormalEquations {
             let scaled = weight * value;
             let column = first_global + b;
             self.gradient[column] += scaled * residual;
-            for k in 0..4 {
-                for axis in 0..3 {
-                    *self.at(3 * (span + k) + axis, column) += scaled * basis[k] * gradient[axis];
-                }
-            }
             for (a, &other) in global[..=b].iter().enumerate() {
                 *self.at(first_global + a, column) += scaled * other;
             }
         }
+    }
+
+    /// Moves what the blocks hold to where the factorisation reads it.
+    fn gather(&mut self) {
+        let Self { base, values, gradient, blocks, .. } = self;
+        let first_global = 3 * self.controls;
+        blocks.drain(|span, block, mixed| {
+            let first = 3 * span;
+            for (k, sums) in block.first.iter().enumerate() {
+                let part = &mut gradient[first + 3 * k..][..3];
+                part.iter_mut().zip(sums).for_each(|(entry, sum)| *entry += sum);
+            }
+            for ((k, l), sums) in PAIRS.into_iter().zip(&block.second) {
+                for (b, products) in PRODUCT.iter().enumerate() {
+                    let start = base[first + 3 * l + b].wrapping_add(first + 3 * k);
+                    // Of the blocks on the diagonal the upper triangle only.
+                    let rows = if k == l { b + 1 } else { 3 };
+                    let part = &mut values[start..start + rows];
+                    part.iter_mut().zip(products).for_each(|(entry, m)| *entry += sums[*m]);
+                }
+            }
+            for (global, sums) in mixed.iter().enumerate() {
+                for (k, sums) in sums.iter().enumerate() {
+                    let start = base[first_global + global].wrapping_add(first + 3 * k);
+                    let part = &mut values[start..start + 3];
+                    part.iter_mut().zip(sums).for_each(|(entry, sum)| *entry += sum);
+                }
+            }
+        });
     }
 
     /// Adds `weight / 2 * residual²` of a global unknown alone.
@@ -215,6 +230,7 @@ impl NormalEquations {
     pub(crate) fn factorise(&mut self, damping: f64) -> Result<Factor<'_>, FitError> {
         let unknowns = self.unknowns();
         let singular = FitError::Singular { unknowns };
+        self.gather();
         self.damped.copy_from_slice(&self.values);
         let mut largest = 0.0f64;
         for column in 0..unknowns {
@@ -277,7 +293,8 @@ impl NormalEquations {
 
     /// Gradient of the cost, one number per unknown.
     #[cfg(test)]
-    pub(crate) fn gradient(&self) -> &[f64] {
+    pub(crate) fn gradient(&mut self) -> &[f64] {
+        self.gather();
         &self.gradient
     }
 }

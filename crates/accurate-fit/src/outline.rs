@@ -6,10 +6,14 @@ use ndarray::{Array2, ArrayView2};
 use crate::FitError;
 use crate::bucket_grid::BucketGrid;
 use crate::distance_map::DistanceMap;
+use crate::nearest::PointLanes;
 use crate::outline_map::OutlineMap;
 
 /// How far around the mask a curve that left it still learns where the mask is, px.
 const MARGIN_PX: usize = 32;
+
+/// Pixels of a row that are looked at together whether any is set: most of an image is empty.
+const STRETCH: usize = 64;
 
 /// The outline of a thin body in view `V`: points between body and background, each with the
 /// direction into the body.
@@ -33,6 +37,7 @@ pub struct BoundaryPoint<V: View> {
 pub(crate) struct OutlineData {
     /// `[x, y, inward x, inward y]`, in the order of the bucket grid.
     pub(crate) points: Vec<[f64; 4]>,
+    pub(crate) lanes: PointLanes,
     pub(crate) grid: BucketGrid,
     pub(crate) outside: DistanceMap,
     pub(crate) size: ImageSize,
@@ -120,25 +125,39 @@ impl<V: View> Outline<V> {
         point_between: impl Fn([usize; 2], [usize; 2]) -> [f64; 4],
     ) -> Result<Self, FitError> {
         let (rows, columns) = mask.dim();
+        let standard = mask.as_standard_layout();
+        let pixels = standard.as_slice().unwrap_or_default();
+        let row = |y: usize| &pixels[y * columns..(y + 1) * columns];
         let mut points = Vec::new();
         let mut area = 0usize;
         let mut bounds = [usize::MAX, usize::MAX, 0, 0];
         for y in 0..rows {
-            for x in 0..columns {
-                let here = mask[[y, x]];
-                if here {
-                    area += 1;
-                    bounds =
-                        [bounds[0].min(x), bounds[1].min(y), bounds[2].max(x), bounds[3].max(y)];
+            let here = row(y);
+            let below = if y + 1 < rows { row(y + 1) } else { here };
+            for first in (0..columns).step_by(STRETCH) {
+                let end = (first + STRETCH).min(columns);
+                let beyond = (end + 1).min(columns);
+                if !any(&here[first..beyond]) && !any(&below[first..end]) {
+                    continue;
                 }
-                let right = (x + 1 < columns).then(|| [x + 1, y]);
-                let below = (y + 1 < rows).then(|| [x, y + 1]);
-                for [nx, ny] in right.into_iter().chain(below) {
-                    if mask[[ny, nx]] != here {
-                        let (outer, inner) =
-                            if here { ([nx, ny], [x, y]) } else { ([x, y], [nx, ny]) };
-                        points.push(point_between(outer, inner));
+                for x in first..end {
+                    let inside = here[x];
+                    if inside {
+                        area += 1;
+                        let [x0, y0, x1, y1] = bounds;
+                        bounds = [x0.min(x), y0.min(y), x1.max(x), y1.max(y)];
                     }
+                    let mut pair = |nx: usize, ny: usize, other: bool| {
+                        if other != inside {
+                            let (at, next) = ([x, y], [nx, ny]);
+                            let (outer, inner) = if inside { (next, at) } else { (at, next) };
+                            points.push(point_between(outer, inner));
+                        }
+                    };
+                    if x + 1 < columns {
+                        pair(x + 1, y, here[x + 1]);
+                    }
+                    pair(x, y + 1, below[x]);
                 }
             }
         }
@@ -153,8 +172,16 @@ impl<V: View> Outline<V> {
         let outside = DistanceMap::new(mask, bounds, MARGIN_PX);
         let (grid, points) = BucketGrid::sort(points);
         let size = ImageSize { width: columns as u32, height: rows as u32 };
-        let data =
-            OutlineData { points, grid, outside, size, half_thickness_px, digitised, map: None };
+        let data = OutlineData {
+            lanes: PointLanes::new(&points),
+            points,
+            grid,
+            outside,
+            size,
+            half_thickness_px,
+            digitised,
+            map: None,
+        };
         Ok(Self { data, view: PhantomData })
     }
 
@@ -181,6 +208,11 @@ impl<V: View> Outline<V> {
     pub fn size(&self) -> ImageSize {
         self.data.size
     }
+}
+
+/// Whether a pixel is set, without a branch for each.
+fn any(pixels: &[bool]) -> bool {
+    pixels.iter().fold(false, |any, &set| any | set)
 }
 
 /// The point between two pixels, `[x, y]` outside and inside, where `image` crosses `level`, and the

@@ -1,11 +1,13 @@
-use accurate_geom::nalgebra::{RowVector3, Vector2, Vector3};
+use accurate_geom::nalgebra::Vector3;
+use pulp::{Arch, NullaryFnOnce};
 
 use crate::FitError;
-use crate::chords::{Chords, Nearest, is_sampled};
+use crate::chords::Chords;
+use crate::nearest::NearestPoints;
 use crate::normal::NormalEquations;
 use crate::outline::OutlineData;
 use crate::projector::{Nuisance, Projector};
-use crate::uniform_spline::{UniformSpline, basis, basis_1};
+use crate::uniform_spline::UniformSpline;
 
 /// What the boundary fit solves for.
 #[derive(Debug, Clone)]
@@ -67,7 +69,7 @@ pub(crate) struct Evaluation {
     pub(crate) rows: Vec<Row>,
     /// Data of the step being tried that are out of reach now.
     pub(crate) lost: usize,
-    pub(crate) nearest: [Vec<Nearest>; 2],
+    pub(crate) nearest: [NearestPoints; 2],
     /// If not empty: the precisions of the outline points that are data of the step being tried;
     /// not positive for the others.
     pub(crate) precision: [Vec<f64>; 2],
@@ -88,11 +90,6 @@ pub(crate) struct OutlineProblem<'a> {
     pub(crate) local_smoothness: Vec<f64>,
 }
 
-/// An outline point is no datum if its outward normal turns more than this (cosine) away from the
-/// curve: the cut face of a gap, or the other side of the body.
-const MIN_COSINE: f64 = 0.2;
-/// ... or if it lies deeper in the body than this fraction of the half thickness.
-const MIN_DEPTH: f64 = 0.3;
 /// Variance of a boundary point besides digitisation, px²: 0.07 px rendering and model error.
 const OTHER_VARIANCE: f64 = 0.005;
 /// A body with a smaller half thickness is drawn as one row of pixels, px.
@@ -127,7 +124,7 @@ impl OutlineProblem<'_> {
             e.chords[view].rebuild(&e.state.spline, &projector, view as u8 + 1, steps)?;
             let radius = half + settings.reach_px.max(least);
             let outline = self.outlines[view];
-            e.chords[view].nearest(outline, radius, settings.stride, &mut e.nearest[view]);
+            e.nearest[view].find(&e.chords[view], outline, radius);
             self.boundary_rows(e, view, &projector, settings);
             self.outside_rows(e, view, &projector);
         }
@@ -146,7 +143,7 @@ impl OutlineProblem<'_> {
     /// `share` with the curve's normal: the inverse of its variance `share² / 12`, with a floor for
     /// what is not digitisation, relative to the mean variance 1/18.
     /// A point of a probability map has the variance that the map gives it.
-    fn precision(&self, view: usize, share: f64, point: usize) -> f64 {
+    pub(crate) fn precision(&self, view: usize, share: f64, point: usize) -> f64 {
         let outline = self.outlines[view];
         let variance = match &outline.map {
             Some(map) => map.variance[point],
@@ -171,63 +168,6 @@ impl OutlineProblem<'_> {
                 row.precision = self.precision(row.view, row.share, row.point);
                 precision[row.view][row.point] = row.precision;
             }
-        }
-    }
-
-    /// Adds the rows of one view's outline.
-    fn boundary_rows(
-        &self,
-        e: &mut Evaluation,
-        view: usize,
-        projector: &Projector,
-        settings: &Settings,
-    ) {
-        let half = e.state.half_px[view];
-        let spline = &e.state.spline;
-        let end = spline.spans() as f64;
-        let trying = !e.precision[view].is_empty();
-        for (i, near) in e.nearest[view].iter_mut().enumerate() {
-            if settings.stride > 1 && !is_sampled(i, settings.stride) {
-                continue;
-            }
-            let known = if trying { e.precision[view][i] } else { 0.0 };
-            if !(near.squared < (half + settings.reach_px).powi(2)) {
-                e.lost += usize::from(known > 0.0);
-                continue;
-            }
-            let [bx, by, inward_x, inward_y] = self.outlines[view].points[i];
-            let b = Vector2::new(bx, by);
-            // The chords are within their sag of the curve: one Gauss-Newton step of the parameter
-            // leaves an error of second order in it.
-            let (span, t) = spline.locate(near.u);
-            let x = spline.combine(span, basis(t));
-            let dx = spline.combine(span, basis_1(t));
-            let (p, jacobian) = projector.project_with_jacobian(&x);
-            let tangent = jacobian * dx;
-            let step = (b - p).dot(&tangent) / tangent.norm_squared().max(f64::MIN_POSITIVE);
-            let u = (near.u + step.clamp(-0.5, 0.5)).clamp(0.0, end);
-            let p = p + tangent * (u - near.u);
-            let out = b - p;
-            let distance = out.norm();
-            *near = Nearest { squared: distance * distance, u };
-            let outward = -(out.x * inward_x + out.y * inward_y);
-            let passes = distance > MIN_DEPTH * half
-                && distance < half + settings.reach_px
-                && outward > MIN_COSINE * distance;
-            let held = if trying { known > 0.0 } else { passes };
-            if !(passes || held) {
-                continue;
-            }
-            // On the curve itself no direction is better than another.
-            let towards = if distance > 0.0 { out / distance } else { Vector2::zeros() };
-            let mut row = row(spline, view, projector, u, &p, &jacobian, towards, distance);
-            row.point = i;
-            row.passes = passes;
-            row.held = held;
-            row.share = outward / distance;
-            row.precision =
-                if known > 0.0 { known } else { self.precision(row.view, row.share, i) };
-            e.rows.push(row);
         }
     }
 
@@ -270,26 +210,8 @@ impl OutlineProblem<'_> {
         let squared_scale = settings.scale_px * settings.scale_px;
         let factor = settings.stride as f64;
         let outside = [0, 1].map(|view| self.outside_weight(e, view, settings));
-        let globals = normal.globals();
-        for row in e.rows.iter().filter(|row| row.held) {
-            let mut global = [0.0; 5];
-            global[2..].copy_from_slice(&row.nuisance);
-            let (residual, weight) = if row.outside {
-                (row.distance, outside[row.view])
-            } else {
-                global[row.view] = -1.0;
-                let r = row.distance - e.state.half_px[row.view];
-                (r, factor * row.precision / (1.0 + r * r * row.precision / squared_scale))
-            };
-            normal.add_with_globals(
-                row.span,
-                &row.basis,
-                &row.gradient,
-                &global[..globals],
-                residual,
-                weight,
-            );
-        }
+        // No operation is fused: the same sums on every machine.
+        Arch::new().dispatch(AddRows { e, outside, factor, squared_scale, normal });
         normal.add_smoothness(
             &e.state.spline.control,
             settings.lambda2,
@@ -299,38 +221,37 @@ impl OutlineProblem<'_> {
     }
 }
 
-#[allow(clippy::too_many_arguments, reason = "one row, two callers")]
-pub(crate) fn row(
-    spline: &UniformSpline,
-    view: usize,
-    projector: &Projector,
-    u: f64,
-    p: &Vector2<f64>,
-    jacobian: &accurate_geom::nalgebra::Matrix2x3<f64>,
-    towards: Vector2<f64>,
-    distance: f64,
-) -> Row {
-    let (span, t) = spline.locate(u);
-    let g: RowVector3<f64> = -(towards.transpose() * jacobian);
-    let nuisance = if view == 1 {
-        let roll = projector.roll_derivative(p);
-        [-towards.x, -towards.y, -towards.dot(&roll)]
-    } else {
-        [0.0; 3]
-    };
-    Row {
-        view,
-        span,
-        basis: basis(t),
-        gradient: [g.x, g.y, g.z],
-        nuisance,
-        distance,
-        precision: 1.0,
-        passes: true,
-        held: true,
-        share: 1.0,
-        outside: false,
-        point: usize::MAX,
+struct AddRows<'a> {
+    e: &'a Evaluation,
+    /// Weight of a row outside the mask, by view.
+    outside: [f64; 2],
+    /// Weight of a boundary point.
+    factor: f64,
+    squared_scale: f64,
+    normal: &'a mut NormalEquations,
+}
+
+impl NullaryFnOnce for AddRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let globals = self.normal.globals();
+        for row in self.e.rows.iter().filter(|row| row.held) {
+            let mut global = [0.0; 5];
+            global[2..].copy_from_slice(&row.nuisance);
+            let (residual, weight) = if row.outside {
+                (row.distance, self.outside[row.view])
+            } else {
+                global[row.view] = -1.0;
+                let r = row.distance - self.e.state.half_px[row.view];
+                let robust = 1.0 + r * r * row.precision / self.squared_scale;
+                (r, self.factor * row.precision / robust)
+            };
+            let Row { span, basis, gradient, .. } = row;
+            let global = &global[..globals];
+            self.normal.add_with_globals(*span, basis, gradient, global, residual, weight);
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use accurate_geom::nalgebra::Vector2;
 
-use crate::outline_problem::{Evaluation, OutlineProblem, row};
+use crate::outline_problem::{Evaluation, OutlineProblem, Row};
 use crate::projector::Projector;
 use crate::uniform_spline::basis;
 
@@ -34,9 +34,24 @@ impl OutlineProblem<'_> {
             let (span, t) = spline.locate(u);
             let (p, jacobian) = projector.project_with_jacobian(&spline.combine(span, basis(t)));
             let towards = (target - p) / distance;
-            let mut row = row(spline, view, projector, u, &p, &jacobian, towards, distance);
-            row.outside = true;
-            e.rows.push(row);
+            let gradient = -(towards.transpose() * jacobian);
+            e.rows.push(Row {
+                view,
+                span,
+                basis: basis(t),
+                gradient: [gradient.x, gradient.y, gradient.z],
+                nuisance: match view {
+                    0 => [0.0; 3],
+                    _ => projector.nuisance_derivative(&p, towards),
+                },
+                distance,
+                precision: 1.0,
+                passes: true,
+                held: true,
+                share: 1.0,
+                outside: true,
+                point: usize::MAX,
+            });
         }
     }
 

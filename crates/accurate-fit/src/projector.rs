@@ -97,6 +97,28 @@ impl Projector {
         (self.correct(Vector2::new(u, v)), jacobian)
     }
 
+    /// Derivatives of an image point's distance with respect to shift and roll, given the unit direction
+    /// `towards` the point that it is measured from.
+    #[inline]
+    pub(crate) fn nuisance_derivative(
+        &self,
+        image: &Vector2<f64>,
+        towards: Vector2<f64>,
+    ) -> [f64; 3] {
+        [-towards.x, -towards.y, -towards.dot(&self.roll_derivative(image))]
+    }
+
+    /// The same camera for code that becomes vectors.
+    pub(crate) fn numbers(&self) -> CameraNumbers {
+        let rows = |r: usize| [0, 1, 2, 3].map(|c| self.matrix[(r, c)]);
+        CameraNumbers {
+            matrix: [rows(0), rows(1), rows(2)],
+            principal: self.principal.into(),
+            roll: [0, 1].map(|r| [self.roll[(r, 0)], self.roll[(r, 1)]]),
+            shift: self.shift.into(),
+        }
+    }
+
     /// Derivative with respect to the roll of the (corrected) image of a point, px per radian.
     #[inline]
     pub(crate) fn roll_derivative(&self, image: &Vector2<f64>) -> Vector2<f64> {
@@ -110,5 +132,35 @@ impl Projector {
         let (_, jacobian) = self.project_with_jacobian(x);
         // The root mean square over the two image axes of the gradient lengths.
         (0.5 * jacobian.norm_squared()).sqrt()
+    }
+}
+
+/// A [`Projector`] without matrices: those of `nalgebra` cannot be compiled for instructions that are
+/// known at run time only.
+pub(crate) struct CameraNumbers {
+    matrix: [[f64; 4]; 3],
+    principal: [f64; 2],
+    roll: [[f64; 2]; 2],
+    shift: [f64; 2],
+}
+
+impl CameraNumbers {
+    /// As [`Projector::project_with_jacobian`]; the Jacobian by rows.
+    #[inline(always)]
+    pub(crate) fn project_with_jacobian(&self, x: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+        let m = &self.matrix;
+        let on = |row: [f64; 4]| row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3];
+        let inverse = 1.0 / on(m[2]);
+        let at = [on(m[0]) * inverse, on(m[1]) * inverse];
+        let derivative = |axis: usize, k: usize| (m[axis][k] - at[axis] * m[2][k]) * inverse;
+        let off = [at[0] - self.principal[0], at[1] - self.principal[1]];
+        let turned = |row: [f64; 2], x: f64, y: f64| row[0] * x + row[1] * y;
+        let image = |axis: usize| {
+            self.principal[axis] + turned(self.roll[axis], off[0], off[1]) + self.shift[axis]
+        };
+        let row = |axis: usize| {
+            [0, 1, 2].map(|k| turned(self.roll[axis], derivative(0, k), derivative(1, k)))
+        };
+        ([image(0), image(1)], [row(0), row(1)])
     }
 }

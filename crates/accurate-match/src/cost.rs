@@ -1,4 +1,7 @@
+use std::ops::Range;
+
 use accurate_geom::{Fundamental, Pixel, View, View1, View2};
+use pulp::{Arch, NullaryFnOnce};
 
 use crate::MatchError;
 use crate::ray_image::{RayImage, RayImager};
@@ -138,42 +141,63 @@ impl CostModel {
         }
     }
 
+    /// `D_ij` with the side of the line on which the point of view 1 lies; where there is no line, without
+    /// a side.
+    pub(crate) fn signed_cost(&self, i: usize, j: usize) -> f64 {
+        let cost = self.cost(i, j);
+        match self.signed_distance_in_view1(i, j) {
+            Some(side) => cost.copysign(side),
+            None => cost,
+        }
+    }
+
     /// Writes row `i` of `D`: the same numbers as [`cost`](Self::cost), bit by bit, in one sweep.
     /// `row` has `n2` elements.
     pub fn fill_row(&self, i: usize, row: &mut [f64]) {
+        self.fill_part(i, 0..row.len().min(self.n2()), row);
+    }
+
+    /// Writes some columns of row `i` of `D`; `part` has as many elements.
+    pub fn fill_part(&self, i: usize, columns: Range<usize>, part: &mut [f64]) {
+        // No operation is fused: the same numbers on every machine.
+        Arch::new().dispatch(Sweep { costs: self, i, columns, part });
+    }
+
+    #[inline(always)]
+    fn sweep(&self, i: usize, columns: Range<usize>, part: &mut [f64]) {
         let p1 = self.curve1[i];
-        let [a, b, c] = &self.lines1;
+        let [a, b, c] = self.lines1.each_ref().map(|column| &column[columns.clone()]);
+        let curve2 = &self.curve2[columns.clone()];
         let distances1 =
             || a.iter().zip(b).zip(c).map(|((a, b), c)| (a * p1.x + b * p1.y + c).abs());
         match (self.kind, &self.images2[i]) {
             (DistanceKind::View1, _) => {
-                row.iter_mut().zip(distances1()).for_each(|(cell, d1)| *cell = d1);
+                part.iter_mut().zip(distances1()).for_each(|(cell, d1)| *cell = d1);
             }
             (DistanceKind::View2, Some(RayImage::Line(line))) => {
-                row.iter_mut().zip(&self.curve2).for_each(|(cell, p2)| *cell = line.distance(*p2));
+                part.iter_mut().zip(curve2).for_each(|(cell, p2)| *cell = line.distance(*p2));
                 return; // the line of view 2 suffices
             }
             (DistanceKind::Symmetric, Some(RayImage::Line(line))) => {
-                for ((cell, d1), p2) in row.iter_mut().zip(distances1()).zip(&self.curve2) {
+                for ((cell, d1), p2) in part.iter_mut().zip(distances1()).zip(curve2) {
                     *cell = rms(d1, line.distance(*p2));
                 }
             }
             (DistanceKind::Sampson, Some(RayImage::Line(_))) => {
                 let gradient2 = self.gradients2[i];
-                for ((cell, d1), gradient1) in
-                    row.iter_mut().zip(distances1()).zip(&self.gradients1)
-                {
+                let gradients1 = &self.gradients1[columns.clone()];
+                for ((cell, d1), gradient1) in part.iter_mut().zip(distances1()).zip(gradients1) {
                     *cell = sampson(d1, *gradient1, gradient2);
                 }
             }
             _ => {
-                row.iter_mut().enumerate().for_each(|(j, cell)| *cell = self.cost(i, j));
+                part.iter_mut().zip(columns).for_each(|(cell, j)| *cell = self.cost(i, j));
                 return;
             }
         }
         for &j in &self.lineless2 {
-            if let Some(cell) = row.get_mut(j) {
-                *cell = self.cost(i, j);
+            if columns.contains(&j) {
+                part[j - columns.start] = self.cost(i, j);
             }
         }
     }
@@ -280,6 +304,23 @@ fn rms(d1: f64, d2: f64) -> f64 {
 
 /// `|p1ᵀ F p2| / sqrt(g1 + g2)` from the distance in view 1, `d1 = |p1ᵀ F p2| / sqrt(g1)`. Only the
 /// ratio of the gradients enters, hence the scale of `F` does not.
+struct Sweep<'a> {
+    costs: &'a CostModel,
+    i: usize,
+    columns: Range<usize>,
+    part: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Sweep<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.costs.sweep(self.i, self.columns, self.part);
+    }
+}
+
+#[inline(always)]
 fn sampson(d1: f64, gradient1: f64, gradient2: f64) -> f64 {
     d1 * (gradient1 / (gradient1 + gradient2)).sqrt()
 }

@@ -1,5 +1,8 @@
+use std::ops::Range;
+
 use accurate_geom::GeomError;
 
+use crate::cost::CostModel;
 use crate::ends::not_negative;
 use crate::{MAX_ALIGNMENT_BYTES, MatchError};
 
@@ -109,6 +112,98 @@ pub fn align_free(
             return Err(MatchError::Empty { view });
         }
     }
+    let fill = |i: usize, _: Range<usize>, row: &mut [f64]| fill_row(i, row);
+    sweep(n1, n2, fill, prices, ends, |_| 0..n2)?.ok_or(MatchError::NoFinitePath { n1, n2 })
+}
+
+/// As [`align_free`] on the table of `costs`, but only the part of it is looked at that lies near the
+/// cheapest path through blocks of 8 x 8 cells: within 12 samples of it. Most often that is the cheapest
+/// path.
+///
+/// # Errors
+/// As [`align_free`]; also if no path lies there.
+///
+/// # Cost
+/// O(n1·n2 / 64 + 32·n1) time, 1 byte per cell of memory.
+pub(crate) fn align_free_near(
+    costs: &CostModel,
+    prices: &MovePrices,
+    ends: &OpenEnds,
+) -> Result<FreeAlignment, MatchError> {
+    prices.validate()?;
+    let (n1, n2) = (costs.n1(), costs.n2());
+    let (blocks1, blocks2) = (n1.div_ceil(BLOCK), n2.div_ceil(BLOCK));
+    let [mut above, mut below] = [0, 0].map(|i| corners(costs, i));
+    let fill_blocks = |i: usize, _: Range<usize>, row: &mut [f64]| {
+        std::mem::swap(&mut above, &mut below);
+        below = corners(costs, (i + 1) * BLOCK);
+        for (j, cell) in row.iter_mut().enumerate() {
+            let corners = [above[j], above[j + 1], below[j], below[j + 1]];
+            let least = corners.into_iter().fold(f64::INFINITY, |least, d| least.min(d.abs()));
+            let one_side = corners.iter().all(|d| *d > 0.0) || corners.iter().all(|d| *d < 0.0);
+            *cell = if one_side { least } else { 0.0 };
+        }
+    };
+    let block_ends = OpenEnds {
+        begin1: ends.begin1.div_ceil(BLOCK),
+        end1: ends.end1.div_ceil(BLOCK),
+        begin2: ends.begin2.div_ceil(BLOCK),
+        end2: ends.end2.div_ceil(BLOCK),
+    };
+    let no_path = MatchError::NoFinitePath { n1, n2 };
+    let coarse = sweep(blocks1, blocks2, fill_blocks, prices, &block_ends, |_| 0..blocks2)?;
+    let near = near_path(&coarse.ok_or_else(|| no_path.clone())?.path, n1, n2);
+    let fill = |i: usize, columns, part: &mut [f64]| costs.fill_part(i, columns, part);
+    sweep(n1, n2, fill, prices, ends, |i| near[i].clone())?.ok_or(no_path)
+}
+
+/// Signed costs of point `i` (the last if there are fewer) and the first point of every block, and the
+/// last point.
+fn corners(costs: &CostModel, i: usize) -> Vec<f64> {
+    let i = i.min(costs.n1() - 1);
+    let blocks = costs.n2().div_ceil(BLOCK);
+    (0..=blocks).map(|j| costs.signed_cost(i, (j * BLOCK).min(costs.n2() - 1))).collect()
+}
+
+/// Side of a block, samples.
+const BLOCK: usize = 8;
+/// How far from its path the second look goes, samples.
+const ASIDE: usize = 12;
+
+/// By row, the columns near a path through every few samples.
+fn near_path(path: &[(usize, usize)], n1: usize, n2: usize) -> Vec<Range<usize>> {
+    let mut near = vec![n2..0; n1];
+    let mut take = |rows: Range<usize>, columns: Range<usize>| {
+        for row in &mut near[rows.start..rows.end.min(n1)] {
+            let Range { start, end } = row;
+            *row = columns.start.min(*start)..columns.end.min(n2).max(*end);
+        }
+    };
+    for (k, &(i, j)) in path.iter().enumerate() {
+        // To the next match, which may lie behind a gap.
+        let (next_i, next_j) = path.get(k + 1).copied().unwrap_or((i, j));
+        let rows = (i * BLOCK).saturating_sub(ASIDE)..next_i * BLOCK + ASIDE + 1;
+        let columns = (j * BLOCK).saturating_sub(ASIDE)..next_j * BLOCK + ASIDE + 1;
+        take(rows, columns);
+    }
+    // Ends that the path leaves out.
+    if let (Some(&(i, j)), Some(&(last_i, last_j))) = (path.first(), path.last()) {
+        take(0..i * BLOCK, 0..j * BLOCK + ASIDE + 1);
+        take(last_i * BLOCK..n1, (last_j * BLOCK).saturating_sub(ASIDE)..n2);
+    }
+    near
+}
+
+/// The cheapest path through the given columns of each row, if there is one. The first row is looked at
+/// as a whole.
+fn sweep(
+    n1: usize,
+    n2: usize,
+    mut fill_row: impl FnMut(usize, Range<usize>, &mut [f64]),
+    prices: &MovePrices,
+    ends: &OpenEnds,
+    columns_of: impl Fn(usize) -> Range<usize>,
+) -> Result<Option<FreeAlignment>, MatchError> {
     let mut codes = Codes::with_room_for(n1, n2)?;
     let gaps = (prices.gap_open + prices.gap_skip).is_finite();
     let skip = |samples: usize| if samples == 0 { 0.0 } else { samples as f64 * prices.end_skip };
@@ -116,14 +211,17 @@ pub fn align_free(
         if samples <= free { skip(samples) } else { f64::INFINITY }
     };
     let mut costs = vec![0.0; n2];
+    // Infinite beside their columns.
     let mut above = States::new(n2);
     let mut current = States::new(n2);
     let mut best = f64::INFINITY;
     let mut last = None;
     for i in 0..n1 {
-        fill_row(i, &mut costs);
-        refuse_invalid(i, &costs)?;
+        let columns = if i == 0 { 0..n2 } else { columns_of(i) };
+        fill_row(i, columns.clone(), &mut costs[columns.clone()]);
+        refuse_invalid(i, columns.start, &costs[columns.clone()])?;
         let row = codes.push_row();
+        current.columns = columns;
         if i == 0 {
             first_row(&costs, &mut current, row, prices, gaps, |j| begin(j, ends.begin2));
         } else {
@@ -148,13 +246,10 @@ pub fn align_free(
             (n2 - 1 - most..n2 - 1).for_each(|j| consider(j, n2 - 1 - j));
         }
         std::mem::swap(&mut above, &mut current);
+        current.clear();
     }
-    match last {
-        Some(last) if best.is_finite() => {
-            Ok(FreeAlignment { path: codes.trace(last), total_cost: best })
-        }
-        _ => Err(MatchError::NoFinitePath { n1, n2 }),
-    }
+    let found = last.filter(|_| best.is_finite());
+    Ok(found.map(|last| FreeAlignment { path: codes.trace(last), total_cost: best }))
 }
 
 /// Accumulated costs of one row.
@@ -165,12 +260,20 @@ struct States {
     gap1: Vec<f64>,
     /// Sample `j` of view 2 lies in a gap that began after matching something with `i`.
     gap2: Vec<f64>,
+    /// All costs are infinite elsewhere.
+    columns: Range<usize>,
 }
 
 impl States {
     fn new(n2: usize) -> Self {
         let column = || vec![f64::INFINITY; n2];
-        Self { matched: column(), gap1: column(), gap2: column() }
+        Self { matched: column(), gap1: column(), gap2: column(), columns: 0..0 }
+    }
+
+    fn clear(&mut self) {
+        for costs in [&mut self.matched, &mut self.gap1, &mut self.gap2] {
+            costs[self.columns.clone()].fill(f64::INFINITY);
+        }
     }
 }
 
@@ -215,7 +318,8 @@ fn first_row(
     }
 }
 
-/// One row of the recurrence below the first. `start` is the cost of beginning in column 0.
+/// The columns of one row of the recurrence below the first. `start` is the cost of beginning in
+/// column 0.
 fn next_row<const GAPS: bool>(
     costs: &[f64],
     above: &States,
@@ -224,76 +328,86 @@ fn next_row<const GAPS: bool>(
     prices: &MovePrices,
     start: f64,
 ) {
-    let n2 = costs.len();
     let MovePrices { diagonal_weight, step, gap_open, gap_skip, .. } = *prices;
     let opening = gap_open + gap_skip;
-    // Slices of the row's length: no bounds checks in the loop.
-    let (matched_above, gap1_above) = (&above.matched[..n2], &above.gap1[..n2]);
-    let gap2_above = &above.gap2[..n2];
-    let (matched, gap1) = (&mut current.matched[..n2], &mut current.gap1[..n2]);
-    let gap2 = &mut current.gap2[..n2];
-    let codes = &mut codes[..n2];
     // 0 · inf is NaN: a forbidden cell stays forbidden at weight 0.
     let weigh = |d: f64| if d < f64::INFINITY { diagonal_weight * d } else { d };
 
-    let begun = start + weigh(costs[0]);
-    let from_up = matched_above[0] + (costs[0] + step);
-    let mut code;
-    let mut left;
-    (left, code) = if from_up <= begun { (from_up, UP) } else { (begun, START) };
-    matched[0] = left;
-    let mut left_gap2 = f64::INFINITY;
-    if GAPS {
-        let (opened, gone_on) = (matched_above[0] + opening, gap1_above[0] + gap_skip);
-        gap1[0] = if gone_on < opened { gone_on } else { opened };
-        code |= if gone_on < opened { GAP1_GOES_ON } else { 0 };
-        gap2[0] = left_gap2;
+    let Range { start: first, end } = current.columns;
+    if first >= end {
+        return;
     }
-    codes[0] = code;
-    for j in 1..n2 {
-        let d = costs[j];
-        let mut across = matched_above[j - 1];
+    let (mut left, mut left_gap2) = (f64::INFINITY, f64::INFINITY);
+    // Column 0 has no column before it.
+    if first == 0 {
+        let begun = start + weigh(costs[0]);
+        let from_up = above.matched[0] + (costs[0] + step);
+        let mut code;
+        (left, code) = if from_up <= begun { (from_up, UP) } else { (begun, START) };
+        current.matched[0] = left;
+        if GAPS {
+            let (opened, gone_on) = (above.matched[0] + opening, above.gap1[0] + gap_skip);
+            current.gap1[0] = if gone_on < opened { gone_on } else { opened };
+            code |= if gone_on < opened { GAP1_GOES_ON } else { 0 };
+            current.gap2[0] = left_gap2;
+        }
+        codes[0] = code;
+    }
+    let first = first.max(1);
+    // Slices of one length: no bounds checks in the loop.
+    let n = end - first;
+    let (costs, codes) = (&costs[first..end], &mut codes[first..end]);
+    let (matched_before, matched_above) =
+        (&above.matched[first - 1..][..n], &above.matched[first..end]);
+    let (gap1_before, gap1_above) = (&above.gap1[first - 1..][..n], &above.gap1[first..end]);
+    let gap2_before = &above.gap2[first - 1..][..n];
+    let (matched, gap1) = (&mut current.matched[first..end], &mut current.gap1[first..end]);
+    let gap2 = &mut current.gap2[first..end];
+    for k in 0..n {
+        let d = costs[k];
+        let mut across = matched_before[k];
         let mut source = DIAGONAL;
         if GAPS {
-            (across, source) = if gap1_above[j - 1] < across {
-                (gap1_above[j - 1], FROM_GAP1)
+            (across, source) = if gap1_before[k] < across {
+                (gap1_before[k], FROM_GAP1)
             } else {
                 (across, source)
             };
-            (across, source) = if gap2_above[j - 1] < across {
-                (gap2_above[j - 1], FROM_GAP2)
+            (across, source) = if gap2_before[k] < across {
+                (gap2_before[k], FROM_GAP2)
             } else {
                 (across, source)
             };
         }
         across += weigh(d);
         let along = d + step;
-        let from_up = matched_above[j] + along;
+        let from_up = matched_above[k] + along;
         let (other, other_source) = if from_up < across { (from_up, UP) } else { (across, source) };
         let from_left = left + along;
         let mut code = if from_left < other { LEFT } else { other_source };
         if GAPS {
-            let (opened, gone_on) = (matched_above[j] + opening, gap1_above[j] + gap_skip);
-            gap1[j] = if gone_on < opened { gone_on } else { opened };
+            let (opened, gone_on) = (matched_above[k] + opening, gap1_above[k] + gap_skip);
+            gap1[k] = if gone_on < opened { gone_on } else { opened };
             code |= if gone_on < opened { GAP1_GOES_ON } else { 0 };
             let (opened, gone_on) = (left + opening, left_gap2 + gap_skip);
             left_gap2 = if gone_on < opened { gone_on } else { opened };
             code |= if gone_on < opened { GAP2_GOES_ON } else { 0 };
-            gap2[j] = left_gap2;
+            gap2[k] = left_gap2;
         }
         left = if from_left < other { from_left } else { other };
-        matched[j] = left;
-        codes[j] = code;
+        matched[k] = left;
+        codes[k] = code;
     }
 }
 
-fn refuse_invalid(i: usize, costs: &[f64]) -> Result<(), MatchError> {
+/// Costs of row `i` from a column on.
+fn refuse_invalid(i: usize, first: usize, costs: &[f64]) -> Result<(), MatchError> {
     let valid = |d: &f64| *d >= 0.0;
     if costs.iter().fold(true, |all, d| all & valid(d)) {
         return Ok(());
     }
     match costs.iter().enumerate().find(|(_, d)| !valid(d)) {
-        Some((j, &value)) => Err(MatchError::InvalidCost { i, j, value }),
+        Some((j, &value)) => Err(MatchError::InvalidCost { i, j: first + j, value }),
         None => Ok(()),
     }
 }

@@ -5,6 +5,7 @@ use accurate_geom::{EpipolarAngle, Pixel, Rig, Triangulation, View, View1, View2
 use crate::angle_signal::cumulative_lengths;
 use crate::cyclic_dp::cyclic_track;
 use crate::ends::not_negative;
+use crate::free_dp::align_free_near;
 use crate::tangency::{Course, bridge};
 use crate::{
     CostModel, CurveMatcher, CurvePoint, CurveReconstruction, DistanceKind, FreeEnds, MatchError,
@@ -27,6 +28,9 @@ pub struct FreeMatchParams {
     /// At a free end where one view stands still at its last point while the other goes on, points
     /// whose distance exceeds the least by more than this, px, are left out. 0.3: one σ.
     pub end_run_px: f64,
+    /// Whether only the neighbourhood of a first, coarse path is looked at: many times as fast, and most
+    /// often the same. Not for closed curves. No.
+    pub near_coarse_path: bool,
     /// Which stretches are not trusted.
     pub tangency: TangencyParams,
     /// How each pair becomes a 3D point.
@@ -47,6 +51,7 @@ impl FreeMatchParams {
         free1: FreeEnds::ANY,
         free2: FreeEnds::ANY,
         end_run_px: 0.3,
+        near_coarse_path: false,
         tangency: TangencyParams::DEFAULT,
         triangulation: Triangulation::LindstromNiter2,
     };
@@ -185,10 +190,15 @@ impl FreeMatcher {
         let (begin1, end1) = samples_within(curve1, free1);
         let (begin2, end2) = samples_within(&curve2, free2);
         let ends = OpenEnds { begin1, end1, begin2, end2 };
-        let fill = |i: usize, row: &mut [f64]| costs.fill_row(i, row);
-        let found = align_free(costs.n1(), costs.n2(), fill, &params.prices, &ends)?;
+        let (n1, n2) = (costs.n1(), costs.n2());
+        let found = if params.near_coarse_path {
+            align_free_near(&costs, &params.prices, &ends)?
+        } else {
+            let fill = |i: usize, row: &mut [f64]| costs.fill_row(i, row);
+            align_free(n1, n2, fill, &params.prices, &ends)?
+        };
         let path = trim_end_runs(&found.path, &costs, &ends, params.end_run_px);
-        let mean_cost_px = found.total_cost / (costs.n1() + costs.n2()) as f64;
+        let mean_cost_px = found.total_cost / (n1 + n2) as f64;
         Ok(Candidate { costs, path, reversed, first2: 0, closed: false, mean_cost_px })
     }
 

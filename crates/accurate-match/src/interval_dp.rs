@@ -1,6 +1,7 @@
 use std::f32::consts::SQRT_2;
 
 use accurate_geom::GeomError;
+use pulp::{Arch, NullaryFnOnce};
 
 use crate::ends::{FreeEnds, not_negative};
 use crate::{AngleSignal, MatchError};
@@ -127,6 +128,8 @@ impl<'a> Lane<'a> {
 /// The dynamic program for `N` pairs at a time, side by side in vector registers. It keeps its
 /// memory between calls.
 pub(crate) struct IntervalDp<const N: usize> {
+    /// The instructions of the machine at hand. No operation is fused: the costs are the same on all.
+    arch: Arch,
     prices: IntervalPrices,
     low2: Vec<[f32; N]>,
     high2: Vec<[f32; N]>,
@@ -142,6 +145,7 @@ const ROWS_PER_QUESTION: usize = 4;
 impl<const N: usize> IntervalDp<N> {
     pub(crate) fn new(prices: IntervalPrices) -> Self {
         Self {
+            arch: Arch::new(),
             prices,
             low2: Vec::new(),
             high2: Vec::new(),
@@ -184,7 +188,8 @@ impl<const N: usize> IntervalDp<N> {
                 }
             }
             self.current[0] = before;
-            self.advance(&row, i == 0);
+            let arch = self.arch;
+            arch.dispatch(Advance { dp: self, row: &row, first: i == 0 });
             for (k, lane) in lanes.iter().enumerate() {
                 let (n1, n2) = (lane.rows(), lane.columns());
                 if i < n1 && n1 - 1 - i <= lane.trim1.1 {
@@ -240,6 +245,7 @@ impl<const N: usize> IntervalDp<N> {
 
     /// One row of the recurrence. In the first row `above` holds starting costs, which only a
     /// diagonal move may use.
+    #[inline(always)]
     fn advance(&mut self, row: &Row<N>, first: bool) {
         let tolerance = self.prices.tolerance_px as f32;
         let cap = self.prices.cap_px as f32;
@@ -270,6 +276,21 @@ impl<const N: usize> IntervalDp<N> {
             left = cell;
             diagonal = above;
         }
+    }
+}
+
+struct Advance<'a, const N: usize> {
+    dp: &'a mut IntervalDp<N>,
+    row: &'a Row<N>,
+    first: bool,
+}
+
+impl<const N: usize> NullaryFnOnce for Advance<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.dp.advance(self.row, self.first);
     }
 }
 

@@ -123,6 +123,23 @@ proptest! {
         prop_assert!(found.margin_px.unwrap() > 0.01);
     }
 
+    /// The coarse look leads to the cheapest path: of views of one curve, in whole pixels, with ends cut.
+    #[test]
+    fn near_the_coarse_path_lies_the_cheapest(
+        rig in rigs(), helix in rising(), n in 150..400_usize, begin1 in 0..30_usize, end2 in 0..30_usize
+    ) {
+        let truth = points(&helix, n);
+        let whole = |p: f64| p.round();
+        let c1: Vec<Pixel<View1>> =
+            view1(&rig, &truth)[begin1..].iter().map(|p| Pixel::new(whole(p.x), whole(p.y))).collect();
+        let c2: Vec<Pixel<View2>> =
+            view2(&rig, &truth)[..n - end2].iter().map(|p| Pixel::new(whole(p.x), whole(p.y))).collect();
+        let near = FreeMatchParams { near_coarse_path: true, ..TRUSTING };
+        let [found, near] = [TRUSTING, near]
+            .map(|params| FreeMatcher::new(params).match_directed(&c1, &c2, false, &rig));
+        prop_assert_eq!(found, near);
+    }
+
     #[test]
     fn cutting_a_view_leaves_the_other_pairs(
         rig in rigs(), helix in rising(), n in 12..60_usize, begin1 in 0..4_usize, end1 in 0..4_usize,

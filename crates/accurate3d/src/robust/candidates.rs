@@ -8,7 +8,7 @@ use accurate_traverse::{
     GraphEdge, GraphParams, HalfEdge, SkeletonGraph, Walk, WalkEnd, WalkParams, fill_small_holes,
     k_best_walks_with_reward,
 };
-use ndarray::Array2;
+use ndarray::{Array2, Axis, Slice};
 
 use crate::explanation::Alternative;
 use crate::{Error, JunctionDecision};
@@ -247,15 +247,18 @@ fn draw(cut: &mut Array2<bool>, hint: &GapHint, origin: [f64; 2], half_px: f64) 
 fn cut_to_body(array: &Array2<bool>) -> (Array2<bool>, [f64; 2]) {
     let (rows, columns) = array.dim();
     let (mut top, mut bottom, mut left, mut right) = (rows, 0, columns, 0);
-    for ((y, x), _) in array.indexed_iter().filter(|(_, set)| **set) {
-        (top, bottom) = (top.min(y), bottom.max(y));
-        (left, right) = (left.min(x), right.max(x));
+    for (y, row) in array.rows().into_iter().enumerate() {
+        let mut set = row.iter().enumerate().filter(|(_, set)| **set).map(|(x, _)| x);
+        if let Some(first) = set.next() {
+            (top, bottom) = (top.min(y), bottom.max(y));
+            (left, right) = (left.min(first), right.max(set.last().unwrap_or(first)));
+        }
     }
     let (top, left) = (top.saturating_sub(MARGIN_PX), left.saturating_sub(MARGIN_PX));
     let (bottom, right) =
         ((bottom + 1 + MARGIN_PX).min(rows), (right + 1 + MARGIN_PX).min(columns));
-    let cut =
-        Array2::from_shape_fn((bottom - top, right - left), |(y, x)| array[[top + y, left + x]]);
+    let band = array.slice_axis(Axis(0), Slice::from(top..bottom));
+    let cut = band.slice_axis(Axis(1), Slice::from(left..right)).to_owned();
     (cut, [left as f64, top as f64])
 }
 

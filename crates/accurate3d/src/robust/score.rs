@@ -71,6 +71,8 @@ pub(crate) struct Candidate {
     pub(crate) settings: OutlineFitParams,
     /// Whether it is good, perhaps only with finer knots.
     pub(crate) good: bool,
+    /// Whether carrying the fit on gains nothing more.
+    pub(crate) rests: bool,
     /// Outline left unexplained besides cut faces, and curve outside the masks.
     pub(crate) misfit: f64,
     /// Less is better.
@@ -105,6 +107,7 @@ impl Candidate {
             fit,
             settings: SETTLED,
             good: false,
+            rests: false,
             misfit: 0.0,
             score: 0.0,
             prior,
@@ -118,7 +121,7 @@ impl Candidate {
     /// The same origin with another fit.
     pub(crate) fn refitted(&self, fit: OutlineFit, rig: &Rig) -> Self {
         let shape = Shape::new(&fit.curve, rig);
-        let mut candidate = Self { fit, shape, ..self.clone() };
+        let mut candidate = Self { fit, shape, rests: false, ..self.clone() };
         candidate.judge(rig);
         candidate
     }

@@ -16,6 +16,8 @@ use crate::Error;
 pub(crate) const SAME_PX: f64 = 2.0;
 /// A start no farther than this from a fitted curve would end there, px: within reach of the fit.
 const SAME_START_PX: f64 = 4.0;
+/// Fits from two starts that are nowhere farther apart end in the same curve, px.
+const SAME_FIT_PX: f64 = 0.5;
 
 /// For a start that is a fit already: the last settings from the first step on.
 pub(crate) const SETTLED: OutlineFitParams = OutlineFitParams {
@@ -42,11 +44,20 @@ const BRIDGED_PX: [f64; 2] = [12.0, 25.0];
 const QUICK_KEPT: [usize; 3] = [1000, 80, 50];
 
 /// A pair that was fitted.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Tried {
     proposal: Proposal,
+    /// Where its fit started.
+    start: Shape,
     /// From every start.
     wholly: bool,
+}
+
+/// Where the fit of a pair starts.
+struct Start {
+    curve: Curve3,
+    shape: Shape,
+    origin: Origin,
 }
 
 /// A candidate, and whether it was fitted from every start.
@@ -100,25 +111,29 @@ impl Search<'_> {
             Effort::Thorough => *params,
         };
         let proposals = propose_pairs(&angles, &signals1, &signals2, &params).map_err(matching)?;
-        let mut count = 0;
+        // Pairs that were looked at, and those among them that start another fit.
+        let (mut count, mut fits) = (0, 0);
         for proposal in &proposals {
             let proposal =
                 Proposal { i: proposal.i + from[0], j: proposal.j + from[1], ..*proposal };
-            if count >= max_fits || self.settled(found, count, &proposal) {
+            if fits >= max_fits || self.settled(found, count, &proposal) {
                 break;
             }
-            let known = |known: &Tried| {
-                (known.wholly || self.effort == Effort::Quick)
-                    && are_alike(&known.proposal, &proposal, view1, view2)
-            };
-            if tried.iter().any(known) {
+            let mut known = tried.iter().filter(|t| t.wholly || self.effort == Effort::Quick);
+            if known.clone().any(|t| are_alike(&t.proposal, &proposal, view1, view2)) {
                 continue;
             }
+            let Some(start) = self.start(&proposal, view1, view2) else { continue };
             count += 1;
+            if known.any(|t| t.start.is_like(&start.shape, SAME_FIT_PX)) {
+                continue;
+            }
+            fits += 1;
             let good = found.iter().filter(|c| c.good).map(|c| c.score).min_by(f64::total_cmp);
-            let judged = self.judged(&proposal, view1, view2, good);
-            tried.push(Tried { proposal, wholly: judged.as_ref().is_none_or(|j| j.wholly) });
-            found.extend(judged.map(|j| j.candidate));
+            let judged = self.judged(&start, good);
+            let wholly = judged.as_ref().is_none_or(|judged| judged.wholly);
+            tried.push(Tried { proposal, start: start.shape, wholly });
+            found.extend(judged.map(|judged| judged.candidate));
         }
         Ok(proposals.len())
     }
@@ -135,17 +150,15 @@ impl Search<'_> {
         })
     }
 
-    /// The better of a plain and, unless that is good already, an annealed fit. Without much effort
-    /// what is far behind the best `good` score is left at that.
-    fn judged(
+    /// Where the fit of a pair starts; `None` if it gives no curve.
+    fn start(
         &self,
         proposal: &Proposal,
         view1: &ViewCandidates<View1>,
         view2: &ViewCandidates<View2>,
-        good: Option<f64>,
-    ) -> Option<Judged> {
+    ) -> Option<Start> {
         let (walk1, walk2) = (&view1.walks[proposal.i], &view2.walks[proposal.j]);
-        let (start, mean_distance_px) = start_from(
+        let (curve, mean_distance_px) = start_from(
             &PRICES,
             (&walk1.points, free_ends(walk1)),
             (&walk2.points, free_ends(walk2)),
@@ -161,8 +174,15 @@ impl Search<'_> {
             mean_distance_px,
             proposal_score: proposal.score,
         };
-        let judge = |fit| Candidate::new(fit, &origin, self.rig, self.params);
-        let plain = self.fit(&start, &OutlineFitParams::DEFAULT).map(judge);
+        let shape = Shape::new(&curve, self.rig);
+        Some(Start { curve, shape, origin })
+    }
+
+    /// The better of a plain and, unless that is good already, an annealed fit. Without much effort
+    /// what is far behind the best `good` score is left at that.
+    fn judged(&self, start: &Start, good: Option<f64>) -> Option<Judged> {
+        let judge = |fit| Candidate::new(fit, &start.origin, self.rig, self.params);
+        let plain = self.fit(&start.curve, &OutlineFitParams::DEFAULT).map(judge);
         if let Some(mut plain) = plain.clone().filter(|c| c.is_good(self.params)) {
             plain.good = true;
             return Some(Judged { candidate: plain, wholly: true });
@@ -173,7 +193,7 @@ impl Search<'_> {
         if let Some(candidate) = plain.clone().filter(hopeless) {
             return Some(Judged { candidate, wholly: false });
         }
-        let annealed = self.fit(&start, &OutlineFitParams::ANNEALED).map(judge);
+        let annealed = self.fit(&start.curve, &OutlineFitParams::ANNEALED).map(judge);
         let best = [plain, annealed].into_iter().flatten();
         let best = best.min_by(|a, b| a.score.total_cmp(&b.score))?;
         Some(Judged { candidate: self.checked(best), wholly: true })
@@ -305,8 +325,12 @@ impl Search<'_> {
         const ROUNDS: usize = 4;
         const REST: f64 = 0.3;
         let mut best = candidate.clone();
+        if best.rests {
+            return best;
+        }
         for round in 1..=ROUNDS {
             if best.fit.converged {
+                best.rests = true;
                 break;
             }
             let Some(fit) = self.fit(&best.fit.curve, &best.settings) else { break };
@@ -315,9 +339,10 @@ impl Search<'_> {
             if gain > 0.0 {
                 best = next;
             }
+            best.rests = gain < REST;
             // Later rounds gain less than the ones before.
             let hope = gain * (ROUNDS - round) as f64;
-            if gain < REST || best.score - hope > to_beat + CLEAR {
+            if best.rests || best.score - hope > to_beat + CLEAR {
                 break;
             }
         }
@@ -341,6 +366,10 @@ impl Search<'_> {
         found.truncate(self.params.finalists);
         if let Some(best) = found.first().filter(|best| best.good).map(|best| best.score) {
             found.retain(|candidate| candidate.score < best + BEHIND);
+        }
+        if found.len() == 1 && found[0].is_good(self.params) {
+            // No rival: the last fit carries it on.
+            return found;
         }
         let mut to_beat = f64::INFINITY;
         let mut converged = Vec::with_capacity(found.len());

@@ -27,6 +27,7 @@ pub(crate) fn start_from(
         prices: *prices,
         free1: walk1.1,
         free2: walk2.1,
+        near_coarse_path: true,
         ..FreeMatchParams::DEFAULT
     });
     let matched = matcher.match_directed(walk1.0, walk2.0, reversed, rig).ok()?;

@@ -1,0 +1,155 @@
+use pulp::{Arch, NullaryFnOnce};
+
+use crate::chords::Chords;
+use crate::outline::OutlineData;
+
+/// Outline points that are looked at together.
+pub(crate) const LANES: usize = 8;
+
+/// Coordinates of outline points, `LANES` of them side by side; the last ones may be NaN.
+#[derive(Debug, Clone)]
+pub(crate) struct PointLanes {
+    x: Vec<[f64; LANES]>,
+    y: Vec<[f64; LANES]>,
+}
+
+impl PointLanes {
+    /// Of `[x, y, ..]` points.
+    pub(crate) fn new(points: &[[f64; 4]]) -> Self {
+        let side_by_side = |axis: usize| {
+            let lanes = |chunk: &[[f64; 4]]| {
+                std::array::from_fn(|k| chunk.get(k).map_or(f64::NAN, |point| point[axis]))
+            };
+            points.chunks(LANES).map(lanes).collect()
+        };
+        Self { x: side_by_side(0), y: side_by_side(1) }
+    }
+}
+
+/// For every outline point the nearest point of a projected curve.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct NearestPoints {
+    len: usize,
+    squared: Vec<[f64; LANES]>,
+    u: Vec<[f64; LANES]>,
+}
+
+impl NearestPoints {
+    /// Number of outline points.
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Squared distances, px²; infinite where there is none within reach.
+    pub(crate) fn squared(&self) -> &[f64] {
+        &self.squared.as_flattened()[..self.len]
+    }
+
+    /// Parameters on the curve; NaN where there is none within reach.
+    pub(crate) fn u(&self) -> &[f64] {
+        &self.u.as_flattened()[..self.len]
+    }
+
+    /// Replaces one.
+    pub(crate) fn set(&mut self, i: usize, squared: f64, u: f64) {
+        self.squared[i / LANES][i % LANES] = squared;
+        self.u[i / LANES][i % LANES] = u;
+    }
+
+    /// Finds them anew, if nearer than `radius_px`; of equally near chords the first.
+    ///
+    /// Works from the curve's side: each chord visits the outline points around it. The outline's
+    /// grid is built once per image, the curve's would have to be built in every iteration.
+    pub(crate) fn find(&mut self, chords: &Chords, outline: &OutlineData, radius_px: f64) {
+        let lanes = outline.lanes.x.len();
+        self.len = outline.points.len();
+        self.squared.clear();
+        self.squared.resize(lanes, [radius_px * radius_px; LANES]);
+        self.u.clear();
+        self.u.resize(lanes, [f64::NAN; LANES]);
+        // No operation is fused: the same points on every machine.
+        Arch::new().dispatch(Visit { found: self, chords, outline, radius_px });
+    }
+}
+
+/// Every chord's visit to the points around it.
+struct Visit<'a> {
+    found: &'a mut NearestPoints,
+    chords: &'a Chords,
+    outline: &'a OutlineData,
+    radius_px: f64,
+}
+
+impl NullaryFnOnce for Visit<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { found, chords, outline, radius_px } = self;
+        for (k, pair) in chords.points.windows(2).enumerate() {
+            let [ax, ay, bx, by] = [pair[0].x, pair[0].y, pair[1].x, pair[1].y];
+            let chord = Chord {
+                a: [ax, ay],
+                e: [bx - ax, by - ay],
+                inverse: 1.0
+                    / ((bx - ax) * (bx - ax) + (by - ay) * (by - ay)).max(f64::MIN_POSITIVE),
+                begin: k as f64,
+                to_u: chords.parameter(1),
+            };
+            let bounds = [
+                ax.min(bx) - radius_px,
+                ay.min(by) - radius_px,
+                ax.max(bx) + radius_px,
+                ay.max(by) + radius_px,
+            ];
+            let (rows, columns) = outline.grid.buckets_of(bounds);
+            for row in rows {
+                let points = outline.grid.points_of(row, &columns);
+                // Whole lanes: what lies outside the box is out of reach.
+                for lanes in points.start / LANES..points.end.div_ceil(LANES) {
+                    let (x, y) = (&outline.lanes.x[lanes], &outline.lanes.y[lanes]);
+                    chord.visit(x, y, &mut found.squared[lanes], &mut found.u[lanes]);
+                }
+            }
+        }
+        for (squared, u) in found.squared.iter_mut().zip(&found.u) {
+            for lane in 0..LANES {
+                squared[lane] = if u[lane].is_nan() { f64::INFINITY } else { squared[lane] };
+            }
+        }
+    }
+}
+
+struct Chord {
+    a: [f64; 2],
+    e: [f64; 2],
+    /// One over the squared length.
+    inverse: f64,
+    /// Number of the chord.
+    begin: f64,
+    /// Parameters per chord.
+    to_u: f64,
+}
+
+impl Chord {
+    #[inline(always)]
+    fn visit(
+        &self,
+        x: &[f64; LANES],
+        y: &[f64; LANES],
+        squared: &mut [f64; LANES],
+        u: &mut [f64; LANES],
+    ) {
+        for lane in 0..LANES {
+            let (dx, dy) = (x[lane] - self.a[0], y[lane] - self.a[1]);
+            let t = (dx * self.e[0] + dy * self.e[1]) * self.inverse;
+            let t = if t > 0.0 { t } else { 0.0 };
+            let t = if t < 1.0 { t } else { 1.0 };
+            let (rx, ry) = (dx - t * self.e[0], dy - t * self.e[1]);
+            let here = rx * rx + ry * ry;
+            let nearer = here < squared[lane];
+            squared[lane] = if nearer { here } else { squared[lane] };
+            u[lane] = if nearer { (self.begin + t) * self.to_u } else { u[lane] };
+        }
+    }
+}
