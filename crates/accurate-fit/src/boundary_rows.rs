@@ -1,7 +1,8 @@
 //! What the points of an outline say of a curve.
 
 use accurate_geom::nalgebra::Vector2;
-use pulp::{Arch, NullaryFnOnce};
+use accurate_geom::number::{Number, Vector, dot};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::nearest::LANES;
 use crate::outline_problem::{Evaluation, OutlineProblem, Row, Settings};
@@ -138,45 +139,6 @@ impl Batch {
         self.u[lane] = u;
         self.len += 1;
     }
-
-    /// The chords are within their sag of the curve: one Gauss-Newton step of the parameter leaves an
-    /// error of second order in it.
-    #[inline(always)]
-    fn compute(&mut self, camera: &CameraNumbers, end: f64, lane: usize) {
-        let (at, ahead) = (basis(self.t[lane]), basis_1(self.t[lane]));
-        let combine = |w: [f64; 4], axis: usize| {
-            let c = |k: usize| self.control[k][axis][lane];
-            c(0) * w[0] + c(1) * w[1] + c(2) * w[2] + c(3) * w[3]
-        };
-        let x = [combine(at, 0), combine(at, 1), combine(at, 2)];
-        let dx = [combine(ahead, 0), combine(ahead, 1), combine(ahead, 2)];
-        let (image, jacobian) = camera.project_with_jacobian(x);
-        let along = |row: [f64; 3]| row[0] * dx[0] + row[1] * dx[1] + row[2] * dx[2];
-        let tangent = [along(jacobian[0]), along(jacobian[1])];
-        let (bx, by) = (self.boundary[0][lane], self.boundary[1][lane]);
-        let ahead = (bx - image[0]) * tangent[0] + (by - image[1]) * tangent[1];
-        let squared = tangent[0] * tangent[0] + tangent[1] * tangent[1];
-        let step = between(ahead / larger(squared, f64::MIN_POSITIVE), -0.5, 0.5);
-        let u = between(self.u[lane] + step, 0.0, end);
-        let moved = u - self.u[lane];
-        let image = [image[0] + tangent[0] * moved, image[1] + tangent[1] * moved];
-        let (out_x, out_y) = (bx - image[0], by - image[1]);
-        let distance = (out_x * out_x + out_y * out_y).sqrt();
-        // On the curve itself no direction is better than another.
-        let inverse = if distance > 0.0 { 1.0 / distance } else { 0.0 };
-        let towards = [out_x * inverse, out_y * inverse];
-        self.u[lane] = u;
-        self.distance[lane] = distance;
-        self.outward[lane] = -(out_x * self.inward[0][lane] + out_y * self.inward[1][lane]);
-        for axis in 0..2 {
-            self.image[axis][lane] = image[axis];
-            self.towards[axis][lane] = towards[axis];
-        }
-        for axis in 0..3 {
-            self.gradient[axis][lane] =
-                -(towards[0] * jacobian[0][axis] + towards[1] * jacobian[1][axis]);
-        }
-    }
 }
 
 /// The residuals of a batch on a curve whose parameter ends at `end`.
@@ -186,28 +148,99 @@ struct Residuals<'a> {
     end: f64,
 }
 
-impl NullaryFnOnce for Residuals<'_> {
+impl WithSimd for Residuals<'_> {
     type Output = ();
 
+    // No closures here and below: they would be compiled without the instructions of the vectors.
     #[inline(always)]
-    fn call(self) {
-        for lane in 0..LANES {
-            self.batch.compute(self.camera, self.end, lane);
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { batch, camera, end } = self;
+        for k in 0..LANES / S::F64_LANES {
+            let t = Vector::load(simd, &batch.t, k);
+            let zero = t.all(0.0);
+            let mut control = [[zero; 3]; 4];
+            for (control, lanes) in control.iter_mut().zip(&batch.control) {
+                for (coordinate, lanes) in control.iter_mut().zip(lanes) {
+                    *coordinate = Vector::load(simd, lanes, k);
+                }
+            }
+            let u = Vector::load(simd, &batch.u, k);
+            let [x, y] = &batch.boundary;
+            let boundary = [Vector::load(simd, x, k), Vector::load(simd, y, k)];
+            let found = residual(camera, end, &control, t, u, boundary);
+            found.u.store(&mut batch.u, k);
+            found.distance.store(&mut batch.distance, k);
+            let [x, y] = &batch.inward;
+            let inward = [Vector::load(simd, x, k), Vector::load(simd, y, k)];
+            (zero - dot(&found.out, &inward)).store(&mut batch.outward, k);
+            for axis in 0..2 {
+                found.image[axis].store(&mut batch.image[axis], k);
+                found.towards[axis].store(&mut batch.towards[axis], k);
+            }
+            for axis in 0..3 {
+                found.gradient[axis].store(&mut batch.gradient[axis], k);
+            }
         }
     }
 }
 
-// Comparisons instead of clamp and max, which keep a loop from becoming vectors. NaN becomes `least`.
-
-#[inline(always)]
-fn larger(value: f64, least: f64) -> f64 {
-    if value > least { value } else { least }
+/// Where a curve is nearest to a boundary point.
+struct Residual<N> {
+    u: N,
+    image: [N; 2],
+    /// To the boundary point.
+    out: [N; 2],
+    distance: N,
+    towards: [N; 2],
+    gradient: [N; 3],
 }
 
+/// The chords are within their sag of the curve: one Gauss-Newton step of the parameter leaves an error
+/// of second order in it.
 #[inline(always)]
-fn between(value: f64, least: f64, most: f64) -> f64 {
-    let value = larger(value, least);
-    if value < most { value } else { most }
+fn residual<N: Number>(
+    camera: &CameraNumbers,
+    end: f64,
+    control: &[[N; 3]; 4],
+    t: N,
+    u: N,
+    boundary: [N; 2],
+) -> Residual<N> {
+    let (zero, one) = (t.all(0.0), t.all(1.0));
+    let x = combined(control, &basis(t));
+    let ahead = combined(control, &basis_1(t));
+    let (near, jacobian) = camera.project_with_jacobian(&x);
+    let tangent = [dot(&jacobian[0], &ahead), dot(&jacobian[1], &ahead)];
+    let off = [boundary[0] - near[0], boundary[1] - near[1]];
+    let squared = dot(&tangent, &tangent).larger(t.all(f64::MIN_POSITIVE));
+    let step = (dot(&off, &tangent) / squared).larger(t.all(-0.5)).smaller(t.all(0.5));
+    let nearest = (u + step).larger(zero).smaller(t.all(end));
+    let moved = nearest - u;
+    let image = [near[0] + tangent[0] * moved, near[1] + tangent[1] * moved];
+    let out = [boundary[0] - image[0], boundary[1] - image[1]];
+    let distance = dot(&out, &out).sqrt();
+    // On the curve itself no direction is better than another.
+    let inverse = distance.if_positive(one / distance, zero);
+    let towards = [out[0] * inverse, out[1] * inverse];
+    let mut gradient = [zero; 3];
+    for axis in 0..3 {
+        gradient[axis] = zero - dot(&towards, &[jacobian[0][axis], jacobian[1][axis]]);
+    }
+    Residual { u: nearest, image, out, distance, towards, gradient }
+}
+
+/// The control points of a span, weighted.
+#[inline(always)]
+fn combined<N: Number>(control: &[[N; 3]; 4], weights: &[N; 4]) -> [N; 3] {
+    let mut sum = [weights[0].all(0.0); 3];
+    for axis in 0..3 {
+        let [a, b, c, d] = control;
+        sum[axis] = a[axis] * weights[0]
+            + b[axis] * weights[1]
+            + c[axis] * weights[2]
+            + d[axis] * weights[3];
+    }
+    sum
 }
 
 /// Whether point `i` belongs to the sample of one in `stride`. A plain `i % stride` would take one

@@ -8,10 +8,11 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
+use pulp::Simd;
 
 use crate::FitError;
 use crate::selected_inverse::SelectedInverse;
-use crate::span_blocks::{PAIRS, PRODUCT, SpanBlocks};
+use crate::span_blocks::{LinearRow, PAIRS, PRODUCT, SpanBlocks};
 
 /// Third difference of four control points.
 pub(crate) const THIRD_DIFFERENCE: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
@@ -107,41 +108,19 @@ impl NormalEquations {
     }
 
     /// Adds `weight / 2 * residual²` whose gradient with respect to control point `span + k` is
-    /// `basis[k] * gradient`.
+    /// `basis[k] * gradient`, and with respect to the global unknowns `global`.
     #[inline(always)]
-    pub(crate) fn add(
-        &mut self,
-        span: usize,
-        basis: &[f64; 4],
-        gradient: &[f64; 3],
-        residual: f64,
-        weight: f64,
-    ) {
-        self.blocks.add(span, basis, gradient, &[], residual, weight);
-    }
-
-    /// As [`NormalEquations::add`], for a residual that also depends on the global unknowns, with
-    /// the derivatives `global`.
-    #[inline(always)]
-    pub(crate) fn add_with_globals(
-        &mut self,
-        span: usize,
-        basis: &[f64; 4],
-        gradient: &[f64; 3],
-        global: &[f64],
-        residual: f64,
-        weight: f64,
-    ) {
-        self.blocks.add(span, basis, gradient, global, residual, weight);
+    pub(crate) fn add<S: Simd>(&mut self, simd: S, row: &LinearRow<'_>) {
+        self.blocks.add(simd, row);
         let first_global = 3 * self.controls;
-        for (b, &value) in global.iter().enumerate() {
+        for (b, &value) in row.global.iter().enumerate() {
             if value == 0.0 {
                 continue;
             }
-            let scaled = weight * value;
+            let scaled = row.weight * value;
             let column = first_global + b;
-            self.gradient[column] += scaled * residual;
-            for (a, &other) in global[..=b].iter().enumerate() {
+            self.gradient[column] += scaled * row.residual;
+            for (a, &other) in row.global[..=b].iter().enumerate() {
                 *self.at(first_global + a, column) += scaled * other;
             }
         }
@@ -153,7 +132,7 @@ impl NormalEquations {
         let first_global = 3 * self.controls;
         blocks.drain(|span, block, mixed| {
             let first = 3 * span;
-            for (k, sums) in block.first.iter().enumerate() {
+            for (k, sums) in block.first.chunks_exact(4).enumerate() {
                 let part = &mut gradient[first + 3 * k..][..3];
                 part.iter_mut().zip(sums).for_each(|(entry, sum)| *entry += sum);
             }
@@ -167,7 +146,7 @@ impl NormalEquations {
                 }
             }
             for (global, sums) in mixed.iter().enumerate() {
-                for (k, sums) in sums.iter().enumerate() {
+                for (k, sums) in sums.chunks_exact(4).enumerate() {
                     let start = base[first_global + global].wrapping_add(first + 3 * k);
                     let part = &mut values[start..start + 3];
                     part.iter_mut().zip(sums).for_each(|(entry, sum)| *entry += sum);

@@ -1,5 +1,5 @@
 use accurate_geom::nalgebra::Vector3;
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::FitError;
 use crate::chords::Chords;
@@ -7,6 +7,7 @@ use crate::nearest::NearestPoints;
 use crate::normal::NormalEquations;
 use crate::outline::OutlineData;
 use crate::projector::{Nuisance, Projector};
+use crate::span_blocks::LinearRow;
 use crate::uniform_spline::UniformSpline;
 
 /// What the boundary fit solves for.
@@ -231,11 +232,11 @@ struct AddRows<'a> {
     normal: &'a mut NormalEquations,
 }
 
-impl NullaryFnOnce for AddRows<'_> {
+impl WithSimd for AddRows<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let globals = self.normal.globals();
         for row in self.e.rows.iter().filter(|row| row.held) {
             let mut global = [0.0; 5];
@@ -250,7 +251,8 @@ impl NullaryFnOnce for AddRows<'_> {
             };
             let Row { span, basis, gradient, .. } = row;
             let global = &global[..globals];
-            self.normal.add_with_globals(*span, basis, gradient, global, residual, weight);
+            let row = LinearRow { span: *span, basis, gradient, global, residual, weight };
+            self.normal.add(simd, &row);
         }
     }
 }

@@ -1,11 +1,14 @@
 use accurate_geom::nalgebra::Vector2;
 
+use pulp::Scalar;
+
 use crate::FitError;
 use crate::chords::Chords;
 use crate::normal::NormalEquations;
 use crate::outline_problem::smoothness;
 use crate::point_data::PointData;
 use crate::projector::{Nuisance, Projector};
+use crate::span_blocks::LinearRow;
 use crate::uniform_spline::{UniformSpline, basis, basis_1};
 
 /// Ordered points of two views and their cameras.
@@ -222,12 +225,11 @@ impl PointProblem<'_> {
         normal.clear();
         for row in e.rows.iter().filter(|row| row.used) {
             let weight = huber_weight(row.residual, settings.huber_px);
-            if self.nuisance_weights.is_some() {
-                let PointRow { span, basis, gradient, global, residual, .. } = row;
-                normal.add_with_globals(*span, basis, gradient, global, *residual, weight);
-            } else {
-                normal.add(row.span, &row.basis, &row.gradient, row.residual, weight);
-            }
+            let PointRow { span, basis, gradient, global, residual, .. } = row;
+            let global: &[f64] = if self.nuisance_weights.is_some() { global } else { &[] };
+            let (span, residual) = (*span, *residual);
+            let row = LinearRow { span, basis, gradient, global, residual, weight };
+            normal.add(Scalar::new(), &row);
         }
         if let Some(weights) = self.nuisance_weights {
             for (k, (value, weight)) in

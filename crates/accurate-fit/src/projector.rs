@@ -1,4 +1,5 @@
 use accurate_geom::nalgebra::{Matrix2, Matrix2x3, Matrix3x4, Vector2, Vector3};
+use accurate_geom::number::Number;
 use accurate_geom::{Camera, Rig};
 
 /// A small correction of view 2: a shift of its image, and a turn of the camera about its optical
@@ -108,7 +109,7 @@ impl Projector {
         [-towards.x, -towards.y, -towards.dot(&self.roll_derivative(image))]
     }
 
-    /// The same camera for code that becomes vectors.
+    /// The same camera for formulas that are written for [`Number`]s.
     pub(crate) fn numbers(&self) -> CameraNumbers {
         let rows = |r: usize| [0, 1, 2, 3].map(|c| self.matrix[(r, c)]);
         CameraNumbers {
@@ -146,21 +147,39 @@ pub(crate) struct CameraNumbers {
 
 impl CameraNumbers {
     /// As [`Projector::project_with_jacobian`]; the Jacobian by rows.
+    // No closures: they would be compiled without the instructions of the vectors.
     #[inline(always)]
-    pub(crate) fn project_with_jacobian(&self, x: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
-        let m = &self.matrix;
-        let on = |row: [f64; 4]| row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3];
-        let inverse = 1.0 / on(m[2]);
-        let at = [on(m[0]) * inverse, on(m[1]) * inverse];
-        let derivative = |axis: usize, k: usize| (m[axis][k] - at[axis] * m[2][k]) * inverse;
-        let off = [at[0] - self.principal[0], at[1] - self.principal[1]];
-        let turned = |row: [f64; 2], x: f64, y: f64| row[0] * x + row[1] * y;
-        let image = |axis: usize| {
-            self.principal[axis] + turned(self.roll[axis], off[0], off[1]) + self.shift[axis]
-        };
-        let row = |axis: usize| {
-            [0, 1, 2].map(|k| turned(self.roll[axis], derivative(0, k), derivative(1, k)))
-        };
-        ([image(0), image(1)], [row(0), row(1)])
+    pub(crate) fn project_with_jacobian<N: Number>(&self, x: &[N; 3]) -> ([N; 2], [[N; 3]; 2]) {
+        let like = x[0];
+        let zero = like.all(0.0);
+        let inverse = like.all(1.0) / on_row(&self.matrix[2], x);
+        let mut off = [zero; 2];
+        let mut pinhole = [[zero; 3]; 2];
+        for axis in 0..2 {
+            let at = on_row(&self.matrix[axis], x) * inverse;
+            for k in 0..3 {
+                let along = like.all(self.matrix[axis][k]) - at * like.all(self.matrix[2][k]);
+                pinhole[axis][k] = along * inverse;
+            }
+            off[axis] = at - like.all(self.principal[axis]);
+        }
+        let mut image = [zero; 2];
+        let mut jacobian = [[zero; 3]; 2];
+        for axis in 0..2 {
+            let (a, b) = (like.all(self.roll[axis][0]), like.all(self.roll[axis][1]));
+            let turned = a * off[0] + b * off[1];
+            image[axis] = like.all(self.principal[axis]) + turned + like.all(self.shift[axis]);
+            for k in 0..3 {
+                jacobian[axis][k] = a * pinhole[0][k] + b * pinhole[1][k];
+            }
+        }
+        (image, jacobian)
     }
+}
+
+/// A row of a projection matrix times a point.
+#[inline(always)]
+fn on_row<N: Number>(row: &[f64; 4], x: &[N; 3]) -> N {
+    let n = x[0];
+    n.all(row[0]) * x[0] + n.all(row[1]) * x[1] + n.all(row[2]) * x[2] + n.all(row[3])
 }

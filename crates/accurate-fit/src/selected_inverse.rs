@@ -88,7 +88,10 @@ impl SelectedInverse {
 mod tests {
     use proptest::prelude::*;
 
+    use pulp::Scalar;
+
     use crate::normal::NormalEquations;
+    use crate::span_blocks::LinearRow;
 
     proptest! {
         #[test]
@@ -101,7 +104,9 @@ mod tests {
         ) {
             let mut normal = NormalEquations::new(8, 2).unwrap();
             for (span, gradient, global, basis) in rows {
-                normal.add_with_globals(span, &basis, &gradient, &global, 0.3, 1.0);
+                let (basis, gradient, global) = (&basis, &gradient, &global);
+                let row = LinearRow { span, basis, gradient, global, residual: 0.3, weight: 1.0 };
+                normal.add(Scalar::new(), &row);
             }
             // Ties every unknown, so that the condition stays below 1e3.
             let controls = [accurate_geom::nalgebra::Vector3::zeros(); 8];
@@ -110,7 +115,10 @@ mod tests {
                 for axis in 0..3 {
                     let mut gradient = [0.0; 3];
                     gradient[axis] = 1.0;
-                    normal.add(span, &[1.0, 0.0, 0.0, 0.5], &gradient, 0.0, 1.0);
+                    let (basis, gradient) = (&[1.0, 0.0, 0.0, 0.5], &gradient);
+                    let row =
+                        LinearRow { span, basis, gradient, global: &[], residual: 0.0, weight: 1.0 };
+                    normal.add(Scalar::new(), &row);
                 }
             }
             normal.add_prior(0, 0.0, 1.0);

@@ -1,3 +1,5 @@
+use pulp::Simd;
+
 /// Sums of the normal equations, one dense block per span of the spline.
 ///
 /// All residuals of a span see the same four control points. The second derivative with respect to the
@@ -11,8 +13,10 @@ pub(crate) struct SpanBlocks {
     mixed: Vec<Controls>,
 }
 
-/// One vector per control point of a span: its three coordinates, and one that stays zero.
-type Controls = [[f64; 4]; 4];
+/// The three coordinates of each control point of a span, and one number that stays zero.
+type Controls = [f64; CONTROLS];
+
+const CONTROLS: usize = 16;
 
 #[derive(Clone)]
 pub(crate) struct Block {
@@ -24,7 +28,7 @@ pub(crate) struct Block {
     pub(crate) first: Controls,
 }
 
-const EMPTY: Block = Block { used: false, second: [[0.0; 8]; 10], first: [[0.0; 4]; 4] };
+const EMPTY: Block = Block { used: false, second: [[0.0; 8]; 10], first: [0.0; CONTROLS] };
 
 pub(crate) const PAIRS: [(usize, usize); 10] =
     [(0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)];
@@ -33,44 +37,37 @@ pub(crate) const PRODUCT: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
 impl SpanBlocks {
     pub(crate) fn new(spans: usize, globals: usize) -> Self {
-        Self { globals, blocks: vec![EMPTY; spans], mixed: vec![[[0.0; 4]; 4]; spans * globals] }
+        Self { globals, blocks: vec![EMPTY; spans], mixed: vec![[0.0; CONTROLS]; spans * globals] }
     }
 
     pub(crate) fn clear(&mut self) {
         self.blocks.fill(EMPTY);
-        self.mixed.fill([[0.0; 4]; 4]);
+        self.mixed.fill([0.0; CONTROLS]);
     }
 
     /// See [`NormalEquations::add_with_globals`](crate::normal::NormalEquations::add_with_globals);
     /// what concerns global unknowns alone is left to the caller.
     #[inline(always)]
-    pub(crate) fn add(
-        &mut self,
-        span: usize,
-        basis: &[f64; 4],
-        gradient: &[f64; 3],
-        global: &[f64],
-        residual: f64,
-        weight: f64,
-    ) {
-        let block = &mut self.blocks[span];
+    pub(crate) fn add<S: Simd>(&mut self, simd: S, row: &LinearRow<'_>) {
+        let block = &mut self.blocks[row.span];
         block.used = true;
-        let [x, y, z] = *gradient;
+        let [x, y, z] = *row.gradient;
         let products = [x * x, x * y, x * z, y * y, y * z, z * z, 0.0, 0.0];
-        let weighted = basis.map(|b| weight * b);
+        let [a, b, c, d] = *row.basis;
+        let weighted = [row.weight * a, row.weight * b, row.weight * c, row.weight * d];
         for (sums, (k, l)) in block.second.iter_mut().zip(PAIRS) {
-            add_scaled(sums, &products, weighted[k] * basis[l]);
+            add_scaled(simd, sums, &products, weighted[k] * row.basis[l]);
         }
         let gradient = [x, y, z, 0.0];
-        for (sums, b) in block.first.iter_mut().zip(weighted) {
-            add_scaled(sums, &gradient, b * residual);
+        let mut first = [0.0; CONTROLS];
+        for (k, value) in first.iter_mut().enumerate() {
+            *value = weighted[k / 4] * gradient[k % 4];
         }
-        for (g, &value) in global.iter().enumerate() {
+        add_scaled(simd, &mut block.first, &first, row.residual);
+        for (g, &value) in row.global.iter().enumerate() {
             if value != 0.0 {
-                let mixed = &mut self.mixed[span * self.globals + g];
-                for (sums, b) in mixed.iter_mut().zip(weighted) {
-                    add_scaled(sums, &gradient, b * value);
-                }
+                let mixed = &mut self.mixed[row.span * self.globals + g];
+                add_scaled(simd, mixed, &first, value);
             }
         }
     }
@@ -82,14 +79,35 @@ impl SpanBlocks {
             let mixed = &mut self.mixed[span * self.globals..(span + 1) * self.globals];
             visit(span, block, mixed);
             *block = EMPTY;
-            mixed.fill([[0.0; 4]; 4]);
+            mixed.fill([0.0; CONTROLS]);
         }
     }
 }
 
+/// A residual with its derivatives.
+pub(crate) struct LinearRow<'a> {
+    pub(crate) span: usize,
+    /// Of the four control points.
+    pub(crate) basis: &'a [f64; 4],
+    /// With respect to the curve point.
+    pub(crate) gradient: &'a [f64; 3],
+    /// With respect to the global unknowns; may be shorter than their number.
+    pub(crate) global: &'a [f64],
+    pub(crate) residual: f64,
+    pub(crate) weight: f64,
+}
+
+/// `N` is a multiple of every vector's length.
 #[inline(always)]
-fn add_scaled<const N: usize>(sums: &mut [f64; N], values: &[f64; N], scale: f64) {
+fn add_scaled<S: Simd, const N: usize>(
+    simd: S,
+    sums: &mut [f64; N],
+    values: &[f64; N],
+    scale: f64,
+) {
+    let scale = simd.splat_f64s(scale);
+    let (sums, values) = (S::as_mut_simd_f64s(sums).0, S::as_simd_f64s(values).0);
     for (sum, value) in sums.iter_mut().zip(values) {
-        *sum += scale * value;
+        *sum = simd.add_f64s(*sum, simd.mul_f64s(scale, *value));
     }
 }

@@ -1,8 +1,11 @@
 use accurate_geom::Point3;
 use accurate_geom::nalgebra::Vector3;
+use accurate_geom::number::Number;
+use pulp::Scalar;
 
 use crate::FitError;
 use crate::normal::NormalEquations;
+use crate::span_blocks::LinearRow;
 
 /// A cubic B-spline with uniform knots: `u` runs from 0 to [`UniformSpline::spans`], one unit per
 /// span; the point at `u` depends on the control points `floor(u) .. floor(u) + 4`.
@@ -12,23 +15,30 @@ pub(crate) struct UniformSpline {
 }
 
 /// Weights of the four control points at the offset `t` in `[0, 1]` of a span.
-#[inline]
-pub(crate) fn basis(t: f64) -> [f64; 4] {
-    let s = 1.0 - t;
+#[inline(always)]
+pub(crate) fn basis<N: Number>(t: N) -> [N; 4] {
+    let (one, three, six) = (t.all(1.0), t.all(3.0), t.all(6.0));
+    let s = one - t;
     let (t2, t3) = (t * t, t * t * t);
     [
-        s * s * s / 6.0,
-        (3.0 * t3 - 6.0 * t2 + 4.0) / 6.0,
-        (-3.0 * t3 + 3.0 * t2 + 3.0 * t + 1.0) / 6.0,
-        t3 / 6.0,
+        s * s * s / six,
+        (three * t3 - six * t2 + t.all(4.0)) / six,
+        (t.all(-3.0) * t3 + three * t2 + three * t + one) / six,
+        t3 / six,
     ]
 }
 
 /// First derivative of [`basis`].
-#[inline]
-pub(crate) fn basis_1(t: f64) -> [f64; 4] {
-    let s = 1.0 - t;
-    [-0.5 * s * s, 1.5 * t * t - 2.0 * t, -1.5 * t * t + t + 0.5, 0.5 * t * t]
+#[inline(always)]
+pub(crate) fn basis_1<N: Number>(t: N) -> [N; 4] {
+    let (half, three_halves) = (t.all(0.5), t.all(1.5));
+    let s = t.all(1.0) - t;
+    [
+        t.all(-0.5) * s * s,
+        three_halves * t * t - t.all(2.0) * t,
+        t.all(-1.5) * t * t + t + half,
+        half * t * t,
+    ]
 }
 
 /// Second derivative of [`basis`].
@@ -113,11 +123,19 @@ impl UniformSpline {
         let mut normal = NormalEquations::new(n, 0)?;
         for (u, point) in data {
             let (span, t) = spline.locate(u);
-            let row = basis(t);
+            let weights = basis(t);
             for axis in 0..3 {
                 let mut gradient = [0.0; 3];
                 gradient[axis] = 1.0;
-                normal.add(span, &row, &gradient, -point[axis], 1.0);
+                let row = LinearRow {
+                    span,
+                    basis: &weights,
+                    gradient: &gradient,
+                    global: &[],
+                    residual: -point[axis],
+                    weight: 1.0,
+                };
+                normal.add(Scalar::new(), &row);
             }
         }
         normal.add_smoothness(&spline.control, lambda2, lambda3, &[]);

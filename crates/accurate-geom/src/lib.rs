@@ -25,6 +25,7 @@ mod distortion;
 mod epipolar;
 mod epipolar_angle;
 mod error;
+pub mod number;
 mod pixel;
 mod polyline;
 mod projection_matrix;

@@ -3,9 +3,9 @@ use std::marker::PhantomData;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::method::Method;
-use super::number::{Two, Vector};
 use super::two_view::TwoView;
 use super::{Triangulated, Triangulator};
+use crate::number::{Two, Vector};
 use crate::{Pixel, Point3, View1, View2};
 
 /// Pairs that go through the kernel at once: a multiple of two of every vector, small enough for the

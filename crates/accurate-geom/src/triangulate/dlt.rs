@@ -2,10 +2,10 @@ use nalgebra::{Matrix4, SVD};
 
 use super::Triangulator;
 use super::method::Method;
-use super::number::{Number, add_scaled, constant, dot, scaled};
 use super::solution::Solution;
 use super::two_view::{Parallax, TwoView};
 use crate::GeomError;
+use crate::number::{Number, add_scaled, constant, dot, scaled};
 
 const MAX_SVD_ITERATIONS: usize = 200;
 

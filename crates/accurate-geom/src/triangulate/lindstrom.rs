@@ -1,8 +1,8 @@
 use super::method::Method;
 use super::midpoint::Midpoint;
-use super::number::{Number, add_scaled, constant, cross, dot, scaled};
 use super::solution::Solution;
 use super::two_view::TwoView;
+use crate::number::{Number, add_scaled, constant, cross, dot, scaled};
 
 /// Moves both pixels least so that their rays meet, then intersects the rays.
 ///

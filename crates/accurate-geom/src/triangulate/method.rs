@@ -1,6 +1,6 @@
-use super::number::Number;
 use super::solution::Solution;
 use super::two_view::TwoView;
+use crate::number::Number;
 
 /// A triangulation without branches: on one pair of pixels or on several side by side.
 pub(super) trait Method {

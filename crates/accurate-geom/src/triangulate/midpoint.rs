@@ -1,7 +1,7 @@
 use super::method::Method;
-use super::number::{Number, add_scaled, constant, cross, dot, scaled};
 use super::solution::Solution;
 use super::two_view::{Parallax, TwoView};
+use crate::number::{Number, add_scaled, constant, cross, dot, scaled};
 
 /// Midpoint of the shortest segment between the two rays.
 ///

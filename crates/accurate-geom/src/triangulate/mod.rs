@@ -4,7 +4,6 @@ mod gauss_newton;
 mod lindstrom;
 mod method;
 mod midpoint;
-mod number;
 mod solution;
 mod two_view;
 

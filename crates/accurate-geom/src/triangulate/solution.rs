@@ -1,7 +1,7 @@
 use super::Triangulator;
-use super::number::{Number, add_scaled, constant, dot};
 use super::two_view::{Parallax, TwoView};
 use crate::error::finite;
+use crate::number::{Number, add_scaled, constant, dot};
 use crate::{GeomError, Pixel, Point3, View1, View2};
 
 /// What a method found, and what tells whether it is a point.

@@ -1,6 +1,6 @@
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 
-use super::number::{Number, constant, cross, dot, scaled};
+use crate::number::{Number, constant, cross, dot, scaled};
 use crate::{Camera, Point3, Rig};
 
 /// One camera in the frame of [`TwoView`].

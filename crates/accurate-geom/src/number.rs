@@ -1,17 +1,21 @@
+//! Numbers one by one or side by side: formulas that are written once for both.
+
 use std::ops::{Add, Div, Mul, Sub};
 
 use pulp::Simd;
 
-/// A number, or several side by side: the formulas of this folder are written once for both.
+/// A number, or several side by side: formulas are written once for both.
 ///
 /// Every operation is the one of `f64`, lane by lane and never fused: the same bits whatever the
 /// width.
-pub(super) trait Number:
+pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     /// `value` in all lanes.
     fn all(self, value: f64) -> Self;
+    /// The square root; NaN of negative numbers.
     fn sqrt(self) -> Self;
+    /// Without the sign.
     fn abs(self) -> Self;
     /// The larger; `other` where `self` is NaN.
     fn larger(self, other: Self) -> Self;
@@ -56,12 +60,26 @@ impl Number for f64 {
 
 /// A vector register of an instruction set.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Vector<S: Simd> {
+pub struct Vector<S: Simd> {
+    /// The instruction set.
     pub simd: S,
+    /// The numbers.
     pub lanes: S::f64s,
 }
 
 impl<S: Simd> Vector<S> {
+    /// Numbers `which * S::F64_LANES` to that many more of `numbers`, whose count is a multiple of it.
+    #[inline(always)]
+    pub fn load(simd: S, numbers: &[f64], which: usize) -> Self {
+        Self { simd, lanes: S::as_simd_f64s(numbers).0[which] }
+    }
+
+    /// Writes them where [`load`](Self::load) takes them from.
+    #[inline(always)]
+    pub fn store(self, numbers: &mut [f64], which: usize) {
+        S::as_mut_simd_f64s(numbers).0[which] = self.lanes;
+    }
+
     #[inline(always)]
     fn with(self, lanes: S::f64s) -> Self {
         Self { simd: self.simd, lanes }
@@ -139,7 +157,7 @@ impl<S: Simd> Number for Vector<S> {
 
 /// Two numbers in step: while one waits for a division, the other goes on.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Two<N>(pub N, pub N);
+pub struct Two<N>(pub N, pub N);
 
 impl<N: Number> Add for Two<N> {
     type Output = Self;
@@ -206,7 +224,7 @@ impl<N: Number> Number for Two<N> {
 
 /// `a · b`.
 #[inline(always)]
-pub(super) fn dot<N: Number, const K: usize>(a: &[N; K], b: &[N; K]) -> N {
+pub fn dot<N: Number, const K: usize>(a: &[N; K], b: &[N; K]) -> N {
     let mut sum = a[0] * b[0];
     for k in 1..K {
         sum = sum + a[k] * b[k];
@@ -216,13 +234,13 @@ pub(super) fn dot<N: Number, const K: usize>(a: &[N; K], b: &[N; K]) -> N {
 
 /// `a x b`.
 #[inline(always)]
-pub(super) fn cross<N: Number>(a: &[N; 3], b: &[N; 3]) -> [N; 3] {
+pub fn cross<N: Number>(a: &[N; 3], b: &[N; 3]) -> [N; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// `a + s b`.
 #[inline(always)]
-pub(super) fn add_scaled<N: Number, const K: usize>(a: &[N; K], s: N, b: &[N; K]) -> [N; K] {
+pub fn add_scaled<N: Number, const K: usize>(a: &[N; K], s: N, b: &[N; K]) -> [N; K] {
     let mut sum = *a;
     for k in 0..K {
         sum[k] = sum[k] + s * b[k];
@@ -232,7 +250,7 @@ pub(super) fn add_scaled<N: Number, const K: usize>(a: &[N; K], s: N, b: &[N; K]
 
 /// `s a`.
 #[inline(always)]
-pub(super) fn scaled<N: Number, const K: usize>(s: N, a: &[N; K]) -> [N; K] {
+pub fn scaled<N: Number, const K: usize>(s: N, a: &[N; K]) -> [N; K] {
     let mut product = *a;
     for k in 0..K {
         product[k] = s * product[k];
@@ -242,7 +260,7 @@ pub(super) fn scaled<N: Number, const K: usize>(s: N, a: &[N; K]) -> [N; K] {
 
 /// A constant vector in all lanes of numbers like `like`.
 #[inline(always)]
-pub(super) fn constant<N: Number, const K: usize>(like: N, values: &[f64; K]) -> [N; K] {
+pub fn constant<N: Number, const K: usize>(like: N, values: &[f64; K]) -> [N; K] {
     let mut all = [like; K];
     for k in 0..K {
         all[k] = like.all(values[k]);
