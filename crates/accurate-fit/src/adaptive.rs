@@ -128,7 +128,8 @@ fn fit_with_knots(
     adaptive: &AdaptiveParams,
     priors: Priors,
 ) -> Result<Posterior, FitError> {
-    let (problem, spline) = pose(start, outlines, rig, params.knot_spacing_px)?;
+    let (mut problem, spline) = pose(start, outlines, rig, params.knot_spacing_px)?;
+    problem.calibrating = priors.nuisance_weights.is_some();
     let (mut minimiser, steps, converged) = run(problem, spline, params, priors)?;
     let (more, inverse) = smooth(&mut minimiser, params, adaptive)?;
     let variance = adaptive.variance_px2();
@@ -195,14 +196,14 @@ pub(crate) fn smooth(
         let (next, largest_change) =
             pool.update(&factors, &inverse, control, variance, settings.lambda3, relaxation);
 
-        let before = (minimiser.current.clone(), factors);
-        factors = next;
+        let before = std::mem::replace(&mut factors, next);
         minimiser.problem.local_smoothness.clone_from(&factors);
         minimiser.step(&settings)?;
         steps += 1;
         // Smoothness must not pull a tip in or a loop open.
         if judge(&minimiser.problem, &minimiser.current).unexplained > allowed {
-            (minimiser.current, factors) = before;
+            minimiser.undo();
+            factors = before;
             minimiser.problem.local_smoothness.clone_from(&factors);
             relaxation -= 1;
             if relaxation == 0 {

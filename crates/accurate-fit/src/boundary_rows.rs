@@ -83,9 +83,10 @@ impl OutlineProblem<'_> {
                 span,
                 basis: basis(t),
                 gradient: batch.gradient.map(|axis| axis[lane]),
-                nuisance: match view {
-                    0 => [0.0; 3],
-                    _ => projector.nuisance_derivative(&image, towards.into()),
+                nuisance: if self.calibrating && view == 1 {
+                    projector.nuisance_derivative(&image, towards.into())
+                } else {
+                    [0.0; 3]
                 },
                 distance,
                 precision,

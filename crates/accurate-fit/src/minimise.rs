@@ -12,6 +12,8 @@ pub(crate) struct Minimiser<'a> {
     /// Fraction of the diagonal that is added to it.
     damping: f64,
     evaluated: Option<Settings>,
+    /// Whether the last step was taken: `trial` is the state before it.
+    stepped: bool,
     priors: Priors,
 }
 
@@ -38,7 +40,16 @@ impl<'a> Minimiser<'a> {
         let normal = NormalEquations::new(start.spline.control.len(), globals)?;
         let current = problem.evaluation(start);
         let trial = current.clone();
-        Ok(Self { problem, current, trial, normal, damping, evaluated: None, priors })
+        Ok(Self {
+            problem,
+            current,
+            trial,
+            normal,
+            damping,
+            evaluated: None,
+            stepped: false,
+            priors,
+        })
     }
 
     fn prior_cost(&self, e: &Evaluation) -> f64 {
@@ -90,10 +101,18 @@ impl<'a> Minimiser<'a> {
         Ok(())
     }
 
+    /// Takes the last step back, if there was one.
+    pub(crate) fn undo(&mut self) {
+        if std::mem::take(&mut self.stepped) {
+            std::mem::swap(&mut self.current, &mut self.trial);
+        }
+    }
+
     /// One accepted step, or none if no damping makes the cost smaller. Returns the relative drop
     /// of the cost.
     pub(crate) fn step(&mut self, settings: &Settings) -> Result<f64, FitError> {
         self.refresh(settings)?;
+        self.stepped = false;
         // Fixed during the step: costs before and after must be sums with the same weights.
         self.problem.renew_data(&mut self.current, &mut self.trial.precision);
         let before = self.cost(settings)?;
@@ -122,6 +141,7 @@ impl<'a> Minimiser<'a> {
                             self.problem.cost(&self.trial, settings) + self.prior_cost(&self.trial);
                         if after <= before {
                             std::mem::swap(&mut self.current, &mut self.trial);
+                            self.stepped = true;
                             self.damping = (self.damping / 4.0).max(DAMPING[0]);
                             return Ok((before - after) / before.max(f64::MIN_POSITIVE));
                         }

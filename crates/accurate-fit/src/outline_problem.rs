@@ -87,6 +87,8 @@ pub(crate) struct OutlineProblem<'a> {
     /// Chords per span: about 1.5 px each.
     pub(crate) steps: usize,
     pub(crate) px_per_unit: f64,
+    /// Whether view 2's nuisance parameters are unknowns.
+    pub(crate) calibrating: bool,
     /// Factors of `lambda3` along the curve; empty: 1 everywhere.
     pub(crate) local_smoothness: Vec<f64>,
 }
@@ -100,9 +102,10 @@ pub(crate) const JUDGED_PX: f64 = 4.8;
 
 impl OutlineProblem<'_> {
     pub(crate) fn evaluation(&self, state: State) -> Evaluation {
+        let points = self.outlines.iter().map(|outline| outline.points.len()).sum();
         Evaluation {
             state,
-            rows: Vec::new(),
+            rows: Vec::with_capacity(points),
             lost: 0,
             nearest: Default::default(),
             precision: Default::default(),
@@ -296,7 +299,8 @@ mod tests {
             let pair = OutlinePair::new(&one, &two);
             let points: Vec<_> = case.truth.iter().step_by(25).copied().collect();
             let truth = Curve3::interpolate(&points).unwrap();
-            let (problem, mut spline) = pose(&truth, &pair, &case.rig, 10.0).unwrap();
+            let (mut problem, mut spline) = pose(&truth, &pair, &case.rig, 10.0).unwrap();
+            problem.calibrating = true;
             for (k, c) in spline.control.iter_mut().enumerate() {
                 // Half a px off, so that there is a gradient.
                 c.y += 0.5 / problem.px_per_unit * (k as f64).sin();

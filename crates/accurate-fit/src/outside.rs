@@ -40,9 +40,10 @@ impl OutlineProblem<'_> {
                 span,
                 basis: basis(t),
                 gradient: [gradient.x, gradient.y, gradient.z],
-                nuisance: match view {
-                    0 => [0.0; 3],
-                    _ => projector.nuisance_derivative(&p, towards),
+                nuisance: if self.calibrating && view == 1 {
+                    projector.nuisance_derivative(&p, towards)
+                } else {
+                    [0.0; 3]
                 },
                 distance,
                 precision: 1.0,

@@ -55,6 +55,7 @@ pub(crate) fn pose<'a>(
         projectors,
         steps: (knot_spacing_px / 1.5).ceil().clamp(2.0, 64.0) as usize,
         px_per_unit,
+        calibrating: false,
         local_smoothness: Vec::new(),
     };
     Ok((problem, spline))

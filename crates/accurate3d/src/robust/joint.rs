@@ -240,7 +240,7 @@ fn choose(
         search.propose_and_fit(view1, view2, [0, 0], params.max_fits, &mut tried, &mut found)?;
     fits += found.len() - before;
     let mut finalists = search.finalists(found);
-    let mut more = search.restarted(&finalists, view1, view2);
+    let mut more = search.restarted(&finalists, &tried, view1, view2);
     if !more.is_empty() {
         more.append(&mut finalists);
         finalists = search.finalists(more);

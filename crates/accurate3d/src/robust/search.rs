@@ -24,6 +24,8 @@ pub(crate) const SETTLED: OutlineFitParams = OutlineFitParams {
     cauchy_scale_start_px: OutlineFitParams::DEFAULT.cauchy_scale_px,
     subsample: false,
     iterations: 8,
+    // Less than a tenth of what scores are compared by.
+    tolerance: 3e-4,
     ..OutlineFitParams::DEFAULT
 };
 
@@ -219,11 +221,12 @@ impl Search<'_> {
     }
 
     /// The first walk pairs again, matched from corner to corner: some stretches along epipolar lines
-    /// come out otherwise. Without much effort only where that start is another one. Before that, where
-    /// a walk takes bridges, once more without what lies near them.
+    /// come out otherwise. Without much effort only where that start is another one than those `tried`.
+    /// Before that, where a walk takes bridges, once more without what lies near them.
     pub(crate) fn restarted(
         &self,
         finalists: &[Candidate],
+        tried: &[Tried],
         view1: &ViewCandidates<View1>,
         view2: &ViewCandidates<View2>,
     ) -> Vec<Candidate> {
@@ -247,10 +250,13 @@ impl Search<'_> {
                 }
             }
             let Some((start, _)) = start else { continue };
-            if self.effort == Effort::Quick
-                && Shape::new(&start, self.rig).is_along(&candidate.shape, SAME_START_PX)
-            {
-                continue;
+            if self.effort == Effort::Quick {
+                let shape = Shape::new(&start, self.rig);
+                if shape.is_along(&candidate.shape, SAME_START_PX)
+                    || tried.iter().any(|t| t.start.is_like(&shape, SAME_FIT_PX))
+                {
+                    continue;
+                }
             }
             for params in [OutlineFitParams::DEFAULT, OutlineFitParams::ANNEALED] {
                 if let Some(fit) = self.fit(&start, &params) {
