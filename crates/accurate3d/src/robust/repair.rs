@@ -21,7 +21,7 @@ impl Search<'_> {
     pub(crate) fn repaired(&self, candidate: &Candidate) -> Candidate {
         let mut best = candidate.clone();
         for _ in 0..ROUNDS {
-            if best.is_good(self.params) {
+            if best.mended || best.is_good(self.params) {
                 break;
             }
             let next = self
@@ -31,7 +31,7 @@ impl Search<'_> {
                 .filter(|next| next.score < best.score - GAIN);
             match next {
                 Some(next) => best = self.converged(&next, f64::INFINITY),
-                None => break,
+                None => best.mended = true,
             }
         }
         best
@@ -54,13 +54,31 @@ impl Search<'_> {
         let points = dense(curve, self.rig);
         let px_per_unit = px_per_unit(&points, self.rig);
         for at_end in [false, true] {
-            for px in LONGER_PX.into_iter().chain(SHORTER_PX.map(|px| -px)) {
+            // Nothing is won by a longer end where all is explained.
+            let longer = if self.is_open(from, at_end) { &LONGER_PX[..] } else { &[] };
+            for px in longer.iter().copied().chain(SHORTER_PX.map(|px| -px)) {
                 let moved = with_end_moved(&points, px_per_unit, at_end, px);
                 let start = moved.and_then(|points| through(&points, px_per_unit));
                 moves.push(refit(start, &plain));
             }
         }
         moves.into_iter().flatten().collect()
+    }
+
+    /// Whether there is unexplained outline within reach of an end.
+    fn is_open(&self, candidate: &Candidate, at_end: bool) -> bool {
+        const BESIDE_PX: f64 = 10.0;
+        let reach_px = LONGER_PX.iter().fold(BESIDE_PX, |reach, px| reach.max(px + BESIDE_PX));
+        let curve = &candidate.fit.curve;
+        let (begin, end) = curve.domain();
+        let point = curve.at(if at_end { end } else { begin });
+        candidate.fit.unexplained.iter().any(|stretch| {
+            let camera = if stretch.view == 1 { self.rig.camera1() } else { self.rig.camera2() };
+            camera.project(&point).is_ok_and(|at| {
+                let near = |[x, y]: &[f64; 2]| (at.x - x).hypot(at.y - y) < reach_px;
+                stretch.points.iter().any(near)
+            })
+        })
     }
 
     /// New walks that want to pass twice where the best fit leaves outline unexplained, paired and

@@ -73,6 +73,8 @@ pub(crate) struct Candidate {
     pub(crate) good: bool,
     /// Whether carrying the fit on gains nothing more.
     pub(crate) rests: bool,
+    /// Whether no repair helps.
+    pub(crate) mended: bool,
     /// Outline left unexplained besides cut faces, and curve outside the masks.
     pub(crate) misfit: f64,
     /// Less is better.
@@ -108,6 +110,7 @@ impl Candidate {
             settings: SETTLED,
             good: false,
             rests: false,
+            mended: false,
             misfit: 0.0,
             score: 0.0,
             prior,
@@ -121,7 +124,7 @@ impl Candidate {
     /// The same origin with another fit.
     pub(crate) fn refitted(&self, fit: OutlineFit, rig: &Rig) -> Self {
         let shape = Shape::new(&fit.curve, rig);
-        let mut candidate = Self { fit, shape, rests: false, ..self.clone() };
+        let mut candidate = Self { fit, shape, rests: false, mended: false, ..self.clone() };
         candidate.judge(rig);
         candidate
     }

@@ -214,6 +214,9 @@ impl Search<'_> {
 
     /// The candidate with knots and smoothness for curves that bend much.
     pub(crate) fn finer(&self, candidate: &Candidate) -> Option<Candidate> {
+        if candidate.settings == FINE && candidate.rests {
+            return Some(candidate.clone());
+        }
         let fit = self.fit(&candidate.fit.curve, &FINE)?;
         let mut finer = candidate.refitted(fit, self.rig);
         finer.settings = FINE;
