@@ -19,6 +19,14 @@ const SAME_START_PX: f64 = 4.0;
 /// Fits from two starts that are nowhere farther apart end in the same curve, px.
 const SAME_FIT_PX: f64 = 0.5;
 
+/// For a start within a few px: to tell the good from the bad, not to the end.
+pub(crate) const PLAIN: OutlineFitParams =
+    OutlineFitParams { tolerance: 1e-3, ..OutlineFitParams::DEFAULT };
+
+/// For a start that may run along the wrong strand for a stretch.
+pub(crate) const ANNEALED: OutlineFitParams =
+    OutlineFitParams { tolerance: 1e-3, ..OutlineFitParams::ANNEALED };
+
 /// For a start that is a fit already: the last settings from the first step on.
 pub(crate) const SETTLED: OutlineFitParams = OutlineFitParams {
     cauchy_scale_start_px: OutlineFitParams::DEFAULT.cauchy_scale_px,
@@ -37,6 +45,9 @@ pub(crate) const FINE: OutlineFitParams =
 const CLEAR: f64 = 5.0;
 /// A score so much worse than a good one's is no rival's.
 const BEHIND: f64 = 10.0;
+/// A plain fit whose score is so much worse than the least so far is not saved by an annealed one: of 49
+/// starts of tuning pairs that were 40 behind none became the best.
+const FAR_BEHIND: f64 = 60.0;
 
 /// How much around the ends of bridges a restart spans smoothly, px.
 const BRIDGED_PX: [f64; 2] = [12.0, 25.0];
@@ -131,8 +142,9 @@ impl Search<'_> {
                 continue;
             }
             fits += 1;
+            let least = found.iter().map(|c| c.score).fold(f64::INFINITY, f64::min);
             let good = found.iter().filter(|c| c.good).map(|c| c.score).min_by(f64::total_cmp);
-            let judged = self.judged(&start, good);
+            let judged = self.judged(&start, least, good);
             let wholly = judged.as_ref().is_none_or(|judged| judged.wholly);
             tried.push(Tried { proposal, start: start.shape, wholly });
             found.extend(judged.map(|judged| judged.candidate));
@@ -180,22 +192,26 @@ impl Search<'_> {
         Some(Start { curve, shape, origin })
     }
 
-    /// The better of a plain and, unless that is good already, an annealed fit. Without much effort
-    /// what is far behind the best `good` score is left at that.
-    fn judged(&self, start: &Start, good: Option<f64>) -> Option<Judged> {
+    /// The better of a plain and, unless that is good already or hopelessly behind the `least` score so
+    /// far, an annealed fit. Without much effort what is behind the best `good` score is left at that.
+    fn judged(&self, start: &Start, least: f64, good: Option<f64>) -> Option<Judged> {
         let judge = |fit| Candidate::new(fit, &start.origin, self.rig, self.params);
-        let plain = self.fit(&start.curve, &OutlineFitParams::DEFAULT).map(judge);
+        let plain = self.fit(&start.curve, &PLAIN).map(judge);
         if let Some(mut plain) = plain.clone().filter(|c| c.is_good(self.params)) {
             plain.good = true;
             return Some(Judged { candidate: plain, wholly: true });
         }
-        let hopeless = |c: &Candidate| {
+        let hopeless = |c: &Candidate| c.score > least + FAR_BEHIND;
+        if let Some(candidate) = plain.clone().filter(hopeless) {
+            return Some(Judged { candidate, wholly: true });
+        }
+        let no_rival = |c: &Candidate| {
             self.effort == Effort::Quick && good.is_some_and(|good| c.score > good + BEHIND)
         };
-        if let Some(candidate) = plain.clone().filter(hopeless) {
+        if let Some(candidate) = plain.clone().filter(no_rival) {
             return Some(Judged { candidate, wholly: false });
         }
-        let annealed = self.fit(&start.curve, &OutlineFitParams::ANNEALED).map(judge);
+        let annealed = self.fit(&start.curve, &ANNEALED).map(judge);
         let best = [plain, annealed].into_iter().flatten();
         let best = best.min_by(|a, b| a.score.total_cmp(&b.score))?;
         Some(Judged { candidate: self.checked(best), wholly: true })
@@ -246,9 +262,7 @@ impl Search<'_> {
             );
             for reach_px in BRIDGED_PX {
                 let bridged = self.bridged(candidate, reach_px);
-                if let Some(fit) =
-                    bridged.and_then(|start| self.fit(&start, &OutlineFitParams::DEFAULT))
-                {
+                if let Some(fit) = bridged.and_then(|start| self.fit(&start, &PLAIN)) {
                     more.push(candidate.refitted(fit, self.rig));
                 }
             }
@@ -261,7 +275,7 @@ impl Search<'_> {
                     continue;
                 }
             }
-            for params in [OutlineFitParams::DEFAULT, OutlineFitParams::ANNEALED] {
+            for params in [PLAIN, ANNEALED] {
                 if let Some(fit) = self.fit(&start, &params) {
                     more.push(candidate.refitted(fit, self.rig));
                 }
@@ -338,17 +352,14 @@ impl Search<'_> {
             return best;
         }
         for round in 1..=ROUNDS {
-            if best.fit.converged {
-                best.rests = true;
-                break;
-            }
             let Some(fit) = self.fit(&best.fit.curve, &best.settings) else { break };
             let next = best.refitted(fit, self.rig);
             let gain = best.score - next.score;
+            let rests = gain < REST || next.fit.converged;
             if gain > 0.0 {
                 best = next;
             }
-            best.rests = gain < REST;
+            best.rests = rests;
             // Later rounds gain less than the ones before.
             let hope = gain * (ROUNDS - round) as f64;
             if best.rests || best.score - hope > to_beat + CLEAR {
