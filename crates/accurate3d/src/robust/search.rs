@@ -45,9 +45,6 @@ pub(crate) const FINE: OutlineFitParams =
 const CLEAR: f64 = 5.0;
 /// A score so much worse than a good one's is no rival's.
 const BEHIND: f64 = 10.0;
-/// A plain fit whose score is so much worse than the least so far is not saved by an annealed one: of 49
-/// starts of tuning pairs that were 40 behind none became the best.
-const FAR_BEHIND: f64 = 60.0;
 
 /// How much around the ends of bridges a restart spans smoothly, px.
 const BRIDGED_PX: [f64; 2] = [12.0, 25.0];
@@ -142,9 +139,8 @@ impl Search<'_> {
                 continue;
             }
             fits += 1;
-            let least = found.iter().map(|c| c.score).fold(f64::INFINITY, f64::min);
             let good = found.iter().filter(|c| c.good).map(|c| c.score).min_by(f64::total_cmp);
-            let judged = self.judged(&start, least, good);
+            let judged = self.judged(&start, good);
             let wholly = judged.as_ref().is_none_or(|judged| judged.wholly);
             tried.push(Tried { proposal, start: start.shape, wholly });
             found.extend(judged.map(|judged| judged.candidate));
@@ -192,23 +188,19 @@ impl Search<'_> {
         Some(Start { curve, shape, origin })
     }
 
-    /// The better of a plain and, unless that is good already or hopelessly behind the `least` score so
-    /// far, an annealed fit. Without much effort what is behind the best `good` score is left at that.
-    fn judged(&self, start: &Start, least: f64, good: Option<f64>) -> Option<Judged> {
+    /// The better of a plain and, unless that is good already, an annealed fit. Without much effort
+    /// what is far behind the best `good` score is left at that.
+    fn judged(&self, start: &Start, good: Option<f64>) -> Option<Judged> {
         let judge = |fit| Candidate::new(fit, &start.origin, self.rig, self.params);
         let plain = self.fit(&start.curve, &PLAIN).map(judge);
         if let Some(mut plain) = plain.clone().filter(|c| c.is_good(self.params)) {
             plain.good = true;
             return Some(Judged { candidate: plain, wholly: true });
         }
-        let hopeless = |c: &Candidate| c.score > least + FAR_BEHIND;
-        if let Some(candidate) = plain.clone().filter(hopeless) {
-            return Some(Judged { candidate, wholly: true });
-        }
-        let no_rival = |c: &Candidate| {
+        let hopeless = |c: &Candidate| {
             self.effort == Effort::Quick && good.is_some_and(|good| c.score > good + BEHIND)
         };
-        if let Some(candidate) = plain.clone().filter(no_rival) {
+        if let Some(candidate) = plain.clone().filter(hopeless) {
             return Some(Judged { candidate, wholly: false });
         }
         let annealed = self.fit(&start.curve, &ANNEALED).map(judge);
