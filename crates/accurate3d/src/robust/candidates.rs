@@ -251,7 +251,7 @@ fn cut_to_body(array: &Array2<bool>) -> (Array2<bool>, [f64; 2]) {
         let mut set = row.iter().enumerate().filter(|(_, set)| **set).map(|(x, _)| x);
         if let Some(first) = set.next() {
             (top, bottom) = (top.min(y), bottom.max(y));
-            (left, right) = (left.min(first), right.max(set.last().unwrap_or(first)));
+            (left, right) = (left.min(first), right.max(set.next_back().unwrap_or(first)));
         }
     }
     let (top, left) = (top.saturating_sub(MARGIN_PX), left.saturating_sub(MARGIN_PX));
