@@ -177,6 +177,22 @@ fn a_direction_that_the_match_leaves_open_is_told_by_the_fits() {
     }
 }
 
+/// At these tips the match leaves a few points without a partner. That is a reason to doubt the tip, not
+/// to end the curve dozens of points before it.
+#[test]
+fn a_doubtful_tip_is_not_left_out_with_all_before_it() {
+    for (family, index) in [(Family::SimPaper, 16), (Family::SimPaper, 30), (Family::Medium, 25)] {
+        let case = generate(family, 1080, index, &CaseOptions::default()).unwrap();
+        let (px, truth) = (per_px(&case), case.truth.clone());
+        let points = case.rounded_points.clone();
+        let pair = ViewPair { points: Some(points), ..ViewPair::from(case) };
+        let found = accurate(&pair, InputKind::Points).unwrap();
+        let scores = curve_scores(&found.positions(), &truth, 0.5 * px).unwrap();
+        // As the others of the family; without the tips 48 to 74 px.
+        assert!(scores.hausdorff < 5.0 * px, "{family} {index}: {} px", scores.hausdorff / px);
+    }
+}
+
 #[test]
 fn turned_images_and_swapped_views_give_the_same_curve() {
     for (family, index) in [(Family::Medium, 0), (Family::Helix, 1), (Family::SimPaper, 2)] {

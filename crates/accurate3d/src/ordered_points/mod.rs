@@ -9,7 +9,7 @@ use accurate_match::{FreeMatch, FreeMatchParams, FreeMatcher, MatchError, Tangen
 
 use adjusted::Adjusted;
 pub(crate) use closed::{Ring, closed_points};
-use part::{End, MatchedPart};
+use part::{DOUBTFUL_POINTS, End, MatchedPart};
 use starts::smoothed_pairs;
 
 use crate::diagnostics::Adjustment;
@@ -168,9 +168,13 @@ impl Curves<'_> {
                 ..*fit_params
             };
             let price = if tips { 0.0 } else { FREE_END * doubtful as f64 };
+            let free = fit_params.free_ends[0].iter().filter(|free| **free).count();
             fits.extend(starts.iter().map(|pairs| {
                 let fit = fit_points(curve1, curve2, pairs, given_rig, &fit_params)?;
-                Ok(PointFit { surprise: fit.surprise + price, ..fit })
+                let lost: usize =
+                    fit.beyond.iter().map(|n| n.saturating_sub(free * DOUBTFUL_POINTS)).sum();
+                let surprise = fit.surprise + price + LOST_POINT * lost as f64;
+                Ok(PointFit { surprise, ..fit })
             }));
         }
         Found {
@@ -193,6 +197,10 @@ fn matcher(tangency: TangencyParams) -> FreeMatcher {
 /// What a free end costs in surprise, beside a tip: in each view a tip says one coordinate more,
 /// whose density would else be that of a place within about 20 px, -2 ln(1/20) = 6.
 const FREE_END: f64 = 12.0;
+
+/// What a point costs in surprise that has a partner, but that the fit leaves beyond a free end, after so
+/// many as an end may be in doubt: a square of 3 σ, of which three in a row count as one.
+const LOST_POINT: f64 = 3.0;
 
 /// What a point without a partner costs in surprise when directions are compared. On 43 tuning curves
 /// whose direction the match leaves open, 1 (and 2) tells all rightly, 0.5 all but one.

@@ -30,7 +30,7 @@ pub(super) enum End {
 /// that much at a tip.
 const TIP_POINTS: usize = 3;
 /// Up to this count they may be none: along an epipolar line, rounding hides where the tip belongs.
-const DOUBTFUL_POINTS: usize = 15;
+pub(super) const DOUBTFUL_POINTS: usize = 15;
 
 impl MatchedPart {
     /// `directed2` runs along curve 1; the match speaks of curve 2 as it was given.
