@@ -1,4 +1,5 @@
-use pulp::{Arch, NullaryFnOnce};
+use accurate_geom::number::{Number, Vector};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::chords::Chords;
 use crate::outline::OutlineData;
@@ -80,35 +81,31 @@ struct Visit<'a> {
     radius_px: f64,
 }
 
-impl NullaryFnOnce for Visit<'_> {
+impl WithSimd for Visit<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self { found, chords, outline, radius_px } = self;
+        let to_u = chords.parameter(1);
         for (k, pair) in chords.points.windows(2).enumerate() {
             let [ax, ay, bx, by] = [pair[0].x, pair[0].y, pair[1].x, pair[1].y];
-            let chord = Chord {
-                a: [ax, ay],
-                e: [bx - ax, by - ay],
-                inverse: 1.0
-                    / ((bx - ax) * (bx - ax) + (by - ay) * (by - ay)).max(f64::MIN_POSITIVE),
-                begin: k as f64,
-                to_u: chords.parameter(1),
-            };
+            let (ex, ey) = (bx - ax, by - ay);
+            let inverse = 1.0 / (ex * ex + ey * ey).max(f64::MIN_POSITIVE);
             let bounds = [
                 ax.min(bx) - radius_px,
                 ay.min(by) - radius_px,
                 ax.max(bx) + radius_px,
                 ay.max(by) + radius_px,
             ];
+            let chord = Chord { a: [ax, ay], e: [ex, ey], inverse, begin: k as f64, to_u };
             let (rows, columns) = outline.grid.buckets_of(bounds);
             for row in rows {
                 let points = outline.grid.points_of(row, &columns);
                 // Whole lanes: what lies outside the box is out of reach.
                 for lanes in points.start / LANES..points.end.div_ceil(LANES) {
                     let (x, y) = (&outline.lanes.x[lanes], &outline.lanes.y[lanes]);
-                    chord.visit(x, y, &mut found.squared[lanes], &mut found.u[lanes]);
+                    chord.visit(simd, x, y, &mut found.squared[lanes], &mut found.u[lanes]);
                 }
             }
         }
@@ -133,23 +130,27 @@ struct Chord {
 
 impl Chord {
     #[inline(always)]
-    fn visit(
+    fn visit<S: Simd>(
         &self,
+        simd: S,
         x: &[f64; LANES],
         y: &[f64; LANES],
         squared: &mut [f64; LANES],
         u: &mut [f64; LANES],
     ) {
-        for lane in 0..LANES {
-            let (dx, dy) = (x[lane] - self.a[0], y[lane] - self.a[1]);
-            let t = (dx * self.e[0] + dy * self.e[1]) * self.inverse;
-            let t = if t > 0.0 { t } else { 0.0 };
-            let t = if t < 1.0 { t } else { 1.0 };
-            let (rx, ry) = (dx - t * self.e[0], dy - t * self.e[1]);
+        for k in 0..LANES / S::F64_LANES {
+            let (x, y) = (Vector::load(simd, x, k), Vector::load(simd, y, k));
+            let (ex, ey) = (x.all(self.e[0]), x.all(self.e[1]));
+            let (dx, dy) = (x - x.all(self.a[0]), y - x.all(self.a[1]));
+            let t = (dx * ex + dy * ey) * x.all(self.inverse);
+            let t = t.larger(x.all(0.0)).smaller(x.all(1.0));
+            let (rx, ry) = (dx - t * ex, dy - t * ey);
             let here = rx * rx + ry * ry;
-            let nearer = here < squared[lane];
-            squared[lane] = if nearer { here } else { squared[lane] };
-            u[lane] = if nearer { (self.begin + t) * self.to_u } else { u[lane] };
+            let least = Vector::load(simd, squared, k);
+            let gain = least - here;
+            gain.if_positive(here, least).store(squared, k);
+            let place = (x.all(self.begin) + t) * x.all(self.to_u);
+            gain.if_positive(place, Vector::load(simd, u, k)).store(u, k);
         }
     }
 }
