@@ -329,3 +329,74 @@ impl<'a> Factor<'a> {
         step
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::nalgebra::{DMatrix, DVector};
+    use proptest::prelude::*;
+    use pulp::{Arch, Scalar, WithSimd};
+
+    use super::*;
+
+    type Drawn = (usize, [f64; 4], [f64; 3], [f64; 2], f64, f64);
+
+    struct AddAll<'a>(&'a mut NormalEquations, &'a [Drawn]);
+
+    impl WithSimd for AddAll<'_> {
+        type Output = ();
+
+        fn with_simd<S: Simd>(self, simd: S) {
+            for (span, basis, gradient, global, residual, weight) in self.1 {
+                let (span, residual, weight) = (*span, *residual, *weight);
+                self.0.add(simd, &LinearRow { span, basis, gradient, global, residual, weight });
+            }
+        }
+    }
+
+    proptest! {
+        /// The step solves the equations that a dense sum of the residuals gives, and is the same bit by
+        /// bit with and without vectors.
+        #[test]
+        fn the_step_solves_the_dense_sum(
+            rows in prop::collection::vec(
+                (0usize..5, prop::array::uniform4(0.0..1.0f64), prop::array::uniform3(-1.0..1.0f64),
+                 prop::array::uniform2(-1.0..1.0f64), -1.0..1.0f64, 0.1..2.0f64),
+                1..80,
+            ),
+        ) {
+            const CONTROLS: usize = 8;
+            const N: usize = 3 * CONTROLS + 2;
+            let (mut h, mut g) = (DMatrix::<f64>::zeros(N, N), DVector::<f64>::zeros(N));
+            for (span, basis, gradient, global, residual, weight) in &rows {
+                let mut j = DVector::<f64>::zeros(N);
+                for k in 0..4 {
+                    for axis in 0..3 {
+                        j[3 * (span + k) + axis] = basis[k] * gradient[axis];
+                    }
+                }
+                j[N - 2] = global[0];
+                j[N - 1] = global[1];
+                h += *weight * &j * j.transpose();
+                g += *weight * *residual * &j;
+            }
+            // Every unknown is tied, so that the condition stays below 1e3.
+            let tie = |normal: &mut NormalEquations| {
+                for column in 0..N {
+                    *normal.at(column, column) += 1.0;
+                }
+            };
+            h += DMatrix::<f64>::identity(N, N);
+            let mut vectors = NormalEquations::new(CONTROLS, 2).unwrap();
+            Arch::new().dispatch(AddAll(&mut vectors, &rows));
+            let mut one_by_one = NormalEquations::new(CONTROLS, 2).unwrap();
+            AddAll(&mut one_by_one, &rows).with_simd(Scalar::new());
+            tie(&mut vectors);
+            tie(&mut one_by_one);
+            let step = vectors.solve(0.0).unwrap().to_vec();
+            prop_assert_eq!(one_by_one.solve(0.0).unwrap(), &step[..]);
+            let left = &h * DVector::from_vec(step) + &g;
+            // Sums of at most 80 terms below 2, solved at that condition.
+            prop_assert!(left.amax() < 1e-9, "{}", left.amax());
+        }
+    }
+}

@@ -45,8 +45,7 @@ impl SpanBlocks {
         self.mixed.fill([0.0; CONTROLS]);
     }
 
-    /// See [`NormalEquations::add_with_globals`](crate::normal::NormalEquations::add_with_globals);
-    /// what concerns global unknowns alone is left to the caller.
+    /// Adds a residual; what concerns global unknowns alone is left to the caller.
     #[inline(always)]
     pub(crate) fn add<S: Simd>(&mut self, simd: S, row: &LinearRow<'_>) {
         let block = &mut self.blocks[row.span];
