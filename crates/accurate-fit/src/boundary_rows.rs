@@ -250,3 +250,49 @@ fn combined<N: Number>(control: &[[N; 3]; 4], weights: &[N; 4]) -> [N; 3] {
 fn is_sampled(i: usize, stride: usize) -> bool {
     ((i as u32).wrapping_mul(2_654_435_769) >> 16).is_multiple_of(stride as u32)
 }
+
+#[cfg(test)]
+mod tests {
+    use accurate_synth::{CaseOptions, Family, generate};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Eight at a time are the bits of one by one, on any machine.
+        #[test]
+        fn residuals_side_by_side_are_those_of_single_points(
+            control in prop::collection::vec(prop::array::uniform3(-60.0..60.0f64), 11),
+            points in prop::collection::vec((prop::array::uniform2(-10.0..500.0f64), 0.0..6.0f64, -1.0..9.0f64), 8),
+        ) {
+            let case = generate(Family::Carm, 1902, 0, &CaseOptions::default()).unwrap();
+            let projector = &Projector::pair(&case.rig)[1];
+            let camera = projector.numbers();
+            let middle = case.truth[case.truth.len() / 2].coords;
+            let control = control.into_iter().map(|c| middle + accurate_geom::nalgebra::Vector3::from(c));
+            let spline = UniformSpline { control: control.collect() };
+            let end = spline.spans() as f64;
+            let mut batch = Batch::default();
+            for (i, (at, turn, u)) in points.iter().enumerate() {
+                batch.push(&spline, i, &[at[0], at[1], turn.cos(), turn.sin()], *u);
+            }
+            Arch::new().dispatch(Residuals { batch: &mut batch, camera: &camera, end });
+            for (lane, (at, turn, u)) in points.iter().enumerate() {
+                let (span, t) = spline.locate(*u);
+                let c = |k: usize| <[f64; 3]>::from(spline.control[span + k]);
+                let one = residual(&camera, end, &[c(0), c(1), c(2), c(3)], t, *u, *at);
+                prop_assert_eq!(batch.u[lane].to_bits(), one.u.to_bits());
+                prop_assert_eq!(batch.distance[lane].to_bits(), one.distance.to_bits());
+                prop_assert_eq!(batch.gradient.map(|axis| axis[lane]), one.gradient);
+                prop_assert_eq!(batch.towards.map(|axis| axis[lane]), one.towards);
+                let outward = 0.0 - dot(&one.out, &[turn.cos(), turn.sin()]);
+                prop_assert_eq!(batch.outward[lane].to_bits(), outward.to_bits());
+                // The same projection as that of the matrices, to rounding.
+                let x = spline.combine(span, basis(t));
+                let (image, _) = projector.project_with_jacobian(&x);
+                let (same, _) = camera.project_with_jacobian(&[x.x, x.y, x.z]);
+                prop_assert!((image - Vector2::from(same)).norm() < 1e-8);
+            }
+        }
+    }
+}

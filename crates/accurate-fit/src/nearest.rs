@@ -154,3 +154,66 @@ impl Chord {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::{Curve3, View1, View2};
+    use accurate_synth::{CaseOptions, Family, generate};
+    use pulp::Scalar;
+
+    use super::*;
+    use crate::pose::pose;
+    use crate::{Outline, OutlinePair};
+
+    /// By a scan of all chords, of crossing wires and of both views; with and without vectors.
+    #[test]
+    fn the_nearest_points_are_those_of_a_scan() {
+        const RADIUS_PX: f64 = 4.5;
+        let mut found_some = 0;
+        for (family, index) in [(Family::Hard, 0), (Family::Carm, 1), (Family::SimPaper, 2)] {
+            let case = generate(family, 1901, index, &CaseOptions::default()).unwrap();
+            let one = Outline::<View1>::from_mask(case.masks[0].view()).unwrap();
+            let two = Outline::<View2>::from_mask(case.masks[1].view()).unwrap();
+            let pair = OutlinePair::new(&one, &two);
+            let points: Vec<_> = case.truth.iter().step_by(25).copied().collect();
+            let truth = Curve3::interpolate(&points).unwrap();
+            let (problem, spline) = pose(&truth, &pair, &case.rig, 10.0).unwrap();
+            for view in 0..2 {
+                let mut chords = Chords::default();
+                let projector = &problem.projectors[view];
+                chords.rebuild(&spline, projector, view as u8 + 1, problem.steps).unwrap();
+                let outline = problem.outlines[view];
+                let mut found = NearestPoints::default();
+                found.find(&chords, outline, RADIUS_PX);
+                for (i, [x, y, ..]) in outline.points.iter().enumerate() {
+                    let mut least = (RADIUS_PX * RADIUS_PX, f64::NAN);
+                    for (k, chord) in chords.points.windows(2).enumerate() {
+                        let e = chord[1] - chord[0];
+                        let (dx, dy) = (x - chord[0].x, y - chord[0].y);
+                        let inverse = 1.0 / (e.x * e.x + e.y * e.y);
+                        let t = ((dx * e.x + dy * e.y) * inverse).clamp(0.0, 1.0);
+                        let (rx, ry) = (dx - t * e.x, dy - t * e.y);
+                        let squared = rx * rx + ry * ry;
+                        if squared < least.0 {
+                            least = (squared, (k as f64 + t) * chords.parameter(1));
+                        }
+                    }
+                    if least.1.is_nan() {
+                        assert_eq!(found.squared()[i], f64::INFINITY);
+                    } else {
+                        found_some += 1;
+                        assert_eq!((found.squared()[i], found.u()[i]), least);
+                    }
+                }
+                let mut plain = found.clone();
+                plain.squared.fill([RADIUS_PX * RADIUS_PX; LANES]);
+                plain.u.fill([f64::NAN; LANES]);
+                let visit =
+                    Visit { found: &mut plain, chords: &chords, outline, radius_px: RADIUS_PX };
+                visit.with_simd(Scalar::new());
+                assert_eq!(plain.squared(), found.squared());
+            }
+        }
+        assert!(found_some > 1000, "{found_some}");
+    }
+}
