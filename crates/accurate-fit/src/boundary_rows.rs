@@ -26,7 +26,6 @@ impl OutlineProblem<'_> {
     ) {
         let limit = (e.state.half_px[view] + settings.reach_px).powi(2);
         let trying = !e.precision[view].is_empty();
-        let camera = projector.numbers();
         let mut batch = Batch::default();
         for i in 0..e.nearest[view].len() {
             if settings.stride > 1 && !is_sampled(i, settings.stride) {
@@ -40,17 +39,16 @@ impl OutlineProblem<'_> {
             let near_u = e.nearest[view].u()[i];
             batch.push(&e.state.spline, i, &self.outlines[view].points[i], near_u);
             if batch.len == LANES {
-                self.rows_of(&mut batch, &camera, e, view, projector, settings);
+                self.rows_of(&mut batch, e, view, projector, settings);
             }
         }
-        self.rows_of(&mut batch, &camera, e, view, projector, settings);
+        self.rows_of(&mut batch, e, view, projector, settings);
     }
 
     /// Adds the rows of a batch, which is empty after that.
     fn rows_of(
         &self,
         batch: &mut Batch,
-        camera: &CameraNumbers,
         e: &mut Evaluation,
         view: usize,
         projector: &Projector,
@@ -58,7 +56,7 @@ impl OutlineProblem<'_> {
     ) {
         let half = e.state.half_px[view];
         let trying = !e.precision[view].is_empty();
-        let end = e.state.spline.spans() as f64;
+        let (camera, end) = (projector.numbers(), e.state.spline.spans() as f64);
         // No operation is fused: the same rows on every machine.
         Arch::new().dispatch(Residuals { batch, camera, end });
         for lane in 0..batch.len {
@@ -276,22 +274,21 @@ mod tests {
             for (i, (at, turn, u)) in points.iter().enumerate() {
                 batch.push(&spline, i, &[at[0], at[1], turn.cos(), turn.sin()], *u);
             }
-            Arch::new().dispatch(Residuals { batch: &mut batch, camera: &camera, end });
+            Arch::new().dispatch(Residuals { batch: &mut batch, camera, end });
             for (lane, (at, turn, u)) in points.iter().enumerate() {
                 let (span, t) = spline.locate(*u);
                 let c = |k: usize| <[f64; 3]>::from(spline.control[span + k]);
-                let one = residual(&camera, end, &[c(0), c(1), c(2), c(3)], t, *u, *at);
+                let one = residual(camera, end, &[c(0), c(1), c(2), c(3)], t, *u, *at);
                 prop_assert_eq!(batch.u[lane].to_bits(), one.u.to_bits());
                 prop_assert_eq!(batch.distance[lane].to_bits(), one.distance.to_bits());
                 prop_assert_eq!(batch.gradient.map(|axis| axis[lane]), one.gradient);
                 prop_assert_eq!(batch.towards.map(|axis| axis[lane]), one.towards);
                 let outward = 0.0 - dot(&one.out, &[turn.cos(), turn.sin()]);
                 prop_assert_eq!(batch.outward[lane].to_bits(), outward.to_bits());
-                // The same projection as that of the matrices, to rounding.
+                // The projection is that of the camera, to rounding.
                 let x = spline.combine(span, basis(t));
-                let (image, _) = projector.project_with_jacobian(&x);
-                let (same, _) = camera.project_with_jacobian(&[x.x, x.y, x.z]);
-                prop_assert!((image - Vector2::from(same)).norm() < 1e-8);
+                let seen = case.rig.camera2().project(&x.into()).unwrap();
+                prop_assert!((projector.project(&x) - Vector2::new(seen.x, seen.y)).norm() < 1e-8);
             }
         }
     }

@@ -1,4 +1,4 @@
-use accurate_geom::nalgebra::{Matrix2, Matrix2x3, Matrix3x4, Vector2, Vector3};
+use accurate_geom::nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use accurate_geom::number::Number;
 use accurate_geom::{Camera, Rig};
 
@@ -27,25 +27,26 @@ impl Nuisance {
 /// One camera, ready to project many points with derivatives.
 #[derive(Debug, Clone)]
 pub(crate) struct Projector {
-    matrix: Matrix3x4<f64>,
-    principal: Vector2<f64>,
+    numbers: CameraNumbers,
     /// `K`'s upper left block: turns a roll of the camera into a map of the image.
     focal: Matrix2<f64>,
     focal_inverse: Matrix2<f64>,
-    shift: Vector2<f64>,
-    roll: Matrix2<f64>,
 }
 
 impl Projector {
     pub(crate) fn new(camera: &Camera) -> Self {
+        let (k, matrix) = (camera.k(), camera.projection_matrix());
+        let row = |r: usize| [0, 1, 2, 3].map(|c| matrix[(r, c)]);
         Self {
-            matrix: camera.projection_matrix(),
-            principal: Vector2::new(camera.k()[(0, 2)], camera.k()[(1, 2)]),
-            focal: camera.k().fixed_view::<2, 2>(0, 0).into_owned(),
+            numbers: CameraNumbers {
+                matrix: [row(0), row(1), row(2)],
+                principal: [k[(0, 2)], k[(1, 2)]],
+                shift: [0.0; 2],
+                roll: [[1.0, 0.0], [0.0, 1.0]],
+            },
+            focal: k.fixed_view::<2, 2>(0, 0).into_owned(),
             // Upper triangular with a diagonal that the camera has checked.
             focal_inverse: camera.k_inverse().fixed_view::<2, 2>(0, 0).into_owned(),
-            shift: Vector2::zeros(),
-            roll: Matrix2::identity(),
         }
     }
 
@@ -55,47 +56,33 @@ impl Projector {
 
     pub(crate) fn set_nuisance(&mut self, nuisance: Nuisance) {
         let (s, c) = nuisance.roll.sin_cos();
-        self.roll = self.focal * Matrix2::new(c, -s, s, c) * self.focal_inverse;
-        self.shift = nuisance.shift_px.into();
+        let roll = self.focal * Matrix2::new(c, -s, s, c) * self.focal_inverse;
+        self.numbers.roll = [0, 1].map(|r| [roll[(r, 0)], roll[(r, 1)]]);
+        self.numbers.shift = nuisance.shift_px;
+    }
+
+    /// The same camera for formulas that are written for [`Number`]s.
+    pub(crate) fn numbers(&self) -> &CameraNumbers {
+        &self.numbers
     }
 
     /// Depth of a world point (the last row of `K` is `0 0 1`).
     #[inline]
     pub(crate) fn depth(&self, x: &Vector3<f64>) -> f64 {
-        let m = &self.matrix;
-        m[(2, 0)] * x.x + m[(2, 1)] * x.y + m[(2, 2)] * x.z + m[(2, 3)]
-    }
-
-    #[inline]
-    fn correct(&self, p: Vector2<f64>) -> Vector2<f64> {
-        self.principal + self.roll * (p - self.principal) + self.shift
+        on_row(&self.numbers.matrix[2], &[x.x, x.y, x.z])
     }
 
     /// The image of a world point, px. Meaningless unless its depth is positive.
     #[inline]
     pub(crate) fn project(&self, x: &Vector3<f64>) -> Vector2<f64> {
-        let m = &self.matrix;
-        let inverse = 1.0 / self.depth(x);
-        let u = (m[(0, 0)] * x.x + m[(0, 1)] * x.y + m[(0, 2)] * x.z + m[(0, 3)]) * inverse;
-        let v = (m[(1, 0)] * x.x + m[(1, 1)] * x.y + m[(1, 2)] * x.z + m[(1, 3)]) * inverse;
-        self.correct(Vector2::new(u, v))
+        self.numbers.project_with_jacobian(&[x.x, x.y, x.z]).0.into()
     }
 
-    /// The image and its derivative with respect to the world point. Uses every entry of the
-    /// projection matrix: neither `f_x = f_y` nor their signs are assumed.
+    /// The image and its derivative with respect to the world point.
     #[inline]
     pub(crate) fn project_with_jacobian(&self, x: &Vector3<f64>) -> (Vector2<f64>, Matrix2x3<f64>) {
-        let m = &self.matrix;
-        let inverse = 1.0 / self.depth(x);
-        let u = (m[(0, 0)] * x.x + m[(0, 1)] * x.y + m[(0, 2)] * x.z + m[(0, 3)]) * inverse;
-        let v = (m[(1, 0)] * x.x + m[(1, 1)] * x.y + m[(1, 2)] * x.z + m[(1, 3)]) * inverse;
-        let mut jacobian = Matrix2x3::zeros();
-        for k in 0..3 {
-            jacobian[(0, k)] = (m[(0, k)] - u * m[(2, k)]) * inverse;
-            jacobian[(1, k)] = (m[(1, k)] - v * m[(2, k)]) * inverse;
-        }
-        let jacobian = self.roll * jacobian;
-        (self.correct(Vector2::new(u, v)), jacobian)
+        let (image, [a, b]) = self.numbers.project_with_jacobian(&[x.x, x.y, x.z]);
+        (image.into(), Matrix2x3::new(a[0], a[1], a[2], b[0], b[1], b[2]))
     }
 
     /// Derivatives of an image point's distance with respect to shift and roll, given the unit direction
@@ -109,21 +96,11 @@ impl Projector {
         [-towards.x, -towards.y, -towards.dot(&self.roll_derivative(image))]
     }
 
-    /// The same camera for formulas that are written for [`Number`]s.
-    pub(crate) fn numbers(&self) -> CameraNumbers {
-        let rows = |r: usize| [0, 1, 2, 3].map(|c| self.matrix[(r, c)]);
-        CameraNumbers {
-            matrix: [rows(0), rows(1), rows(2)],
-            principal: self.principal.into(),
-            roll: [0, 1].map(|r| [self.roll[(r, 0)], self.roll[(r, 1)]]),
-            shift: self.shift.into(),
-        }
-    }
-
     /// Derivative with respect to the roll of the (corrected) image of a point, px per radian.
     #[inline]
     pub(crate) fn roll_derivative(&self, image: &Vector2<f64>) -> Vector2<f64> {
-        let turned = self.focal_inverse * (image - self.principal - self.shift);
+        let CameraNumbers { principal, shift, .. } = self.numbers;
+        let turned = self.focal_inverse * (image - Vector2::from(principal) - Vector2::from(shift));
         // d/da R(a) = R(a) J with J a quarter turn, and R J = J R: no need to turn back.
         self.focal * Vector2::new(-turned.y, turned.x)
     }
@@ -136,8 +113,9 @@ impl Projector {
     }
 }
 
-/// A [`Projector`] without matrices: those of `nalgebra` cannot be compiled for instructions that are
-/// known at run time only.
+/// A camera without matrices: those of `nalgebra` cannot be compiled for instructions that are known at
+/// run time only.
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct CameraNumbers {
     matrix: [[f64; 4]; 3],
     principal: [f64; 2],
@@ -146,7 +124,8 @@ pub(crate) struct CameraNumbers {
 }
 
 impl CameraNumbers {
-    /// As [`Projector::project_with_jacobian`]; the Jacobian by rows.
+    /// The image and its derivative with respect to the world point, by rows. Uses every entry of the
+    /// projection matrix: neither `f_x = f_y` nor their signs are assumed.
     // No closures: they would be compiled without the instructions of the vectors.
     #[inline(always)]
     pub(crate) fn project_with_jacobian<N: Number>(&self, x: &[N; 3]) -> ([N; 2], [[N; 3]; 2]) {

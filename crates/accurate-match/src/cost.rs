@@ -302,8 +302,7 @@ fn rms(d1: f64, d2: f64) -> f64 {
     ((d1 * d1 + d2 * d2) * 0.5).sqrt()
 }
 
-/// `|p1ᵀ F p2| / sqrt(g1 + g2)` from the distance in view 1, `d1 = |p1ᵀ F p2| / sqrt(g1)`. Only the
-/// ratio of the gradients enters, hence the scale of `F` does not.
+/// [`CostModel::sweep`] with the instructions of the machine at hand.
 struct Sweep<'a> {
     costs: &'a CostModel,
     i: usize,
@@ -320,6 +319,8 @@ impl NullaryFnOnce for Sweep<'_> {
     }
 }
 
+/// `|p1ᵀ F p2| / sqrt(g1 + g2)` from the distance in view 1, `d1 = |p1ᵀ F p2| / sqrt(g1)`. Only the
+/// ratio of the gradients enters, hence the scale of `F` does not.
 #[inline(always)]
 fn sampson(d1: f64, gradient1: f64, gradient2: f64) -> f64 {
     d1 * (gradient1 / (gradient1 + gradient2)).sqrt()

@@ -67,15 +67,14 @@ impl Search<'_> {
 
     /// Whether there is unexplained outline within reach of an end.
     fn is_open(&self, candidate: &Candidate, at_end: bool) -> bool {
-        const BESIDE_PX: f64 = 10.0;
-        let reach_px = LONGER_PX.iter().fold(BESIDE_PX, |reach, px| reach.max(px + BESIDE_PX));
+        const REACH_PX: f64 = LONGER_PX[LONGER_PX.len() - 1] + 10.0;
         let curve = &candidate.fit.curve;
         let (begin, end) = curve.domain();
         let point = curve.at(if at_end { end } else { begin });
         candidate.fit.unexplained.iter().any(|stretch| {
             let camera = if stretch.view == 1 { self.rig.camera1() } else { self.rig.camera2() };
             camera.project(&point).is_ok_and(|at| {
-                let near = |[x, y]: &[f64; 2]| (at.x - x).hypot(at.y - y) < reach_px;
+                let near = |[x, y]: &[f64; 2]| (at.x - x).hypot(at.y - y) < REACH_PX;
                 stretch.points.iter().any(near)
             })
         })
