@@ -8,7 +8,7 @@ use super::candidates::ViewCandidates;
 use super::evidence::{Evidence, Walks};
 use super::score::Candidate;
 use super::search::{Effort, Search, Tried};
-use super::suspicion::{Suspicion, suspicions};
+use super::suspicion::{Suspicion, calls_for_a_second_look, suspicions};
 use crate::{Error, Explanation};
 
 /// How hard the joint choice looks.
@@ -138,7 +138,7 @@ pub(crate) fn reconstruct_masks(
     }
     let again = match params.second_look {
         SecondLook::Never => false,
-        SecondLook::InDoubt => !suspicions(&result.evidence).is_empty(),
+        SecondLook::InDoubt => calls_for_a_second_look(&result.evidence),
         SecondLook::Always => true,
     };
     if again {

@@ -27,21 +27,25 @@ pub enum Suspicion {
     NotAdjusted,
 }
 
-/// Thresholds of the reasons, chosen on 420 generated pairs of tuning seeds (`doubt_study`; `easy`,
-/// `medium` also with discs or turned, `hard`, `carm` also off in calibration; 7 of them wrong by more
+/// Thresholds of the reasons, chosen on 840 generated pairs of tuning seeds (`doubt_study`; `easy`,
+/// `medium` also with discs or turned, `hard`, `carm` also off in calibration; 25 of them wrong by more
 /// than 5 px). docs/deviations.md shows what they catch and what they cost: a result without a reason
 /// is likely, not certain, to be right.
-const UNEXPLAINED: f64 = 0.07;
+const UNEXPLAINED: f64 = 0.04;
 /// The same where a walk takes bridges: the faces of what hides the body are no one's outline ...
 const UNEXPLAINED_AT_BRIDGES: f64 = 0.7;
 /// ... unless the walks go back over so much of the body: then the bridges are the wrong ones.
 const OVERLAP_AT_BRIDGES: f64 = 0.25;
 const OUTSIDE: f64 = 0.1;
 const CHI_PER_POINT_PX2: f64 = 0.068;
-const MARGIN: f64 = 4.0;
+const MARGIN: f64 = 3.0;
 const DISTANCE_PX: f64 = 0.4;
 const UNCOVERED: f64 = 0.1;
 const SIGMA_PX: f64 = 1.9;
+
+/// A rival this close is worth a second look, though most of those that stay behind are no reason for
+/// doubt after it.
+const MARGIN_TO_LOOK_AGAIN: f64 = 4.0;
 
 /// The reasons to doubt a final choice, in the order of [`Suspicion`].
 pub(crate) fn suspicions(evidence: &Evidence) -> Vec<Suspicion> {
@@ -52,7 +56,7 @@ pub(crate) fn suspicions(evidence: &Evidence) -> Vec<Suspicion> {
         (e.unexplained > unexplained, Suspicion::UnexplainedOutline),
         (e.outside > OUTSIDE, Suspicion::OutsideMask),
         (e.chi_per_point > CHI_PER_POINT_PX2, Suspicion::Misfit),
-        (e.margin.is_some_and(|margin| margin < MARGIN), Suspicion::Ambiguous),
+        (has_rival(e, MARGIN), Suspicion::Ambiguous),
         (e.walks_distance_px > DISTANCE_PX, Suspicion::ViewsDisagree),
         (e.uncovered > UNCOVERED, Suspicion::Uncovered),
         (e.sigma_px > SIGMA_PX, Suspicion::Uncertain),
@@ -60,6 +64,15 @@ pub(crate) fn suspicions(evidence: &Evidence) -> Vec<Suspicion> {
     .into_iter()
     .filter_map(|(holds, reason)| holds.then_some(reason))
     .collect()
+}
+
+/// Whether a first choice is worth a second look.
+pub(crate) fn calls_for_a_second_look(evidence: &Evidence) -> bool {
+    has_rival(evidence, MARGIN_TO_LOOK_AGAIN) || !suspicions(evidence).is_empty()
+}
+
+fn has_rival(evidence: &Evidence, closer_than: f64) -> bool {
+    evidence.margin.is_some_and(|margin| margin < closer_than)
 }
 
 impl fmt::Display for Suspicion {
@@ -114,6 +127,16 @@ mod tests {
         for (evidence, reason) in cases {
             assert_eq!(suspicions(&evidence), [reason]);
         }
+    }
+
+    #[test]
+    fn a_rival_that_stays_behind_calls_for_a_second_look_only() {
+        let rival = |margin| Evidence { margin: Some(margin), ..GOOD };
+        let close = 0.5 * (MARGIN + MARGIN_TO_LOOK_AGAIN);
+        assert!(suspicions(&rival(close)).is_empty());
+        assert!(calls_for_a_second_look(&rival(close)));
+        assert!(!calls_for_a_second_look(&rival(MARGIN_TO_LOOK_AGAIN)));
+        assert!(calls_for_a_second_look(&Evidence { outside: 0.2, ..GOOD }));
     }
 
     #[test]
