@@ -10,6 +10,7 @@ mod covariance;
 mod curve;
 mod distance_map;
 mod error;
+mod extrapolation;
 mod judgement;
 mod minimise;
 mod nearest;

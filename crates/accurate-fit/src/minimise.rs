@@ -1,6 +1,6 @@
 use crate::FitError;
 use crate::normal::NormalEquations;
-use crate::outline_problem::{Evaluation, OutlineProblem, Settings};
+use crate::outline_problem::{Evaluation, OutlineProblem, Settings, State};
 
 /// Levenberg-Marquardt on an [`OutlineProblem`], one iteration at a time, with its memory.
 #[derive(Debug)]
@@ -32,7 +32,7 @@ const DAMPING: [f64; 2] = [1e-4, 1e3];
 impl<'a> Minimiser<'a> {
     pub(crate) fn new(
         problem: OutlineProblem<'a>,
-        start: crate::outline_problem::State,
+        start: State,
         damping: f64,
         priors: Priors,
     ) -> Result<Self, FitError> {
@@ -99,6 +99,13 @@ impl<'a> Minimiser<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Goes on from another state.
+    pub(crate) fn restart(&mut self, state: State) {
+        self.current.state = state;
+        self.evaluated = None;
+        self.stepped = false;
     }
 
     /// Takes the last step back, if there was one.

@@ -10,7 +10,7 @@ use crate::point_data::{Matched, PointData, matched};
 use crate::point_problem::{
     PointEvaluation, PointProblem, PointSettings, PointState, huber_weight,
 };
-use crate::pool::Pool;
+use crate::pool::{Pool, changed, largest};
 use crate::pose::px_per_unit;
 use crate::projector::Nuisance;
 use crate::projector::Projector;
@@ -164,12 +164,12 @@ pub fn fit_points(
     }
     let before = fitter.rms();
     fitter.settings.window = WINDOWS_PX[1] / fitter.spacing_px;
-    let mut relaxation = 2;
+    let mut relaxation = 2.0;
     for _ in 0..params.rounds {
         let change = fitter.update(params, relaxation)?;
         // Doubled steps may swing; the last ones are plain.
         if change < 0.3 {
-            relaxation = 1;
+            relaxation = 1.0;
         }
         steps += usize::from(fitter.step()?);
         if change < 0.03 {
@@ -280,7 +280,7 @@ impl<'a> Fitter<'a> {
 
     /// Estimates noise and smoothness at the current curve; returns the largest change of a
     /// logarithm.
-    fn update(&mut self, params: &PointFitParams, relaxation: i32) -> Result<f64, FitError> {
+    fn update(&mut self, params: &PointFitParams, relaxation: f64) -> Result<f64, FitError> {
         let inverse = self.inverse()?;
         let mut change = 0.0;
         if !self.noise_known {
@@ -307,10 +307,9 @@ impl<'a> Fitter<'a> {
         let control = &self.current.state.spline.control;
         let lambda3 = self.settings.lambda3;
         let factors = &self.problem.local_smoothness;
-        let (next, smoother) =
-            self.pool.update(factors, &inverse, control, variance, lambda3, relaxation);
-        self.problem.local_smoothness = next;
-        Ok(smoother.max(change))
+        let changes = self.pool.log_changes(factors, &inverse, control, variance, lambda3);
+        self.problem.local_smoothness = changed(factors, &changes, relaxation);
+        Ok(largest(&changes).max(change))
     }
 
     /// Root mean square residual, px.

@@ -39,34 +39,37 @@ impl Pool {
             .collect()
     }
 
-    /// One step of expectation maximisation: local factors of `lambda3` such that third differences
-    /// have the variance that is seen, given residuals of variance `variance`, with the step taken
-    /// `relaxation` times in the logarithm; and the largest change of a logarithm.
-    pub(crate) fn update(
+    /// What one step of expectation maximisation changes the logarithms of the local factors of
+    /// `lambda3` by, such that third differences have the variance that is seen, given residuals of
+    /// variance `variance`.
+    pub(crate) fn log_changes(
         &self,
         factors: &[f64],
         inverse: &SelectedInverse,
         control: &[Vector3<f64>],
         variance: f64,
         lambda3: f64,
-        relaxation: i32,
-    ) -> (Vec<f64>, f64) {
+    ) -> Vec<f64> {
         let seen: Vec<f64> = (0..factors.len())
             .map(|k| {
                 let spread = inverse.combination(k, &THIRD_DIFFERENCE).trace() * variance;
                 (third_difference(control, k).norm_squared() + spread) / 3.0
             })
             .collect();
-        let mut largest = 0.0f64;
-        let next = factors
-            .iter()
-            .zip(self.mean(&seen))
-            .map(|(factor, v)| {
-                let change = variance / (v * lambda3) / factor;
-                largest = largest.max(change.ln().abs());
-                (factor * change.powi(relaxation)).clamp(1e-9, 1e5)
-            })
-            .collect();
-        (next, largest)
+        let wanted = self.mean(&seen).into_iter().map(|v| variance / (v * lambda3));
+        factors.iter().zip(wanted).map(|(factor, wanted)| (wanted / factor).ln()).collect()
     }
+}
+
+/// The largest of some changes, in size.
+pub(crate) fn largest(changes: &[f64]) -> f64 {
+    changes.iter().fold(0.0, |most, change| most.max(change.abs()))
+}
+
+/// Factors changed by `relaxation` times the logarithms, within bounds.
+pub(crate) fn changed(factors: &[f64], changes: &[f64], relaxation: f64) -> Vec<f64> {
+    let factors = factors.iter().zip(changes);
+    factors
+        .map(|(factor, change)| (factor * (relaxation * change).exp()).clamp(1e-9, 1e5))
+        .collect()
 }

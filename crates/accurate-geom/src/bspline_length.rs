@@ -64,9 +64,8 @@ impl<const D: usize> BSpline<D> {
                 (t, reached) = (pieces[current].start, passed);
             }
             let piece = &pieces[current];
-            let found = piece.advance(t, target - reached, RELATIVE_TOLERANCE * total);
-            reached += piece.length(t, found);
-            t = found;
+            let (found, length) = piece.advance(t, target - reached, RELATIVE_TOLERANCE * total);
+            (t, reached) = (found, reached + length);
             parameters.push(t);
         }
         parameters.push(end);
@@ -80,9 +79,9 @@ impl<const D: usize> BSpline<D> {
 }
 
 impl<const D: usize> Piece<D> {
-    /// The parameter that lies `length` beyond `from`, at most the end of the piece: Newton inside
-    /// a shrinking bracket.
-    fn advance(&self, from: f64, length: f64, tolerance: f64) -> f64 {
+    /// The parameter that lies `length` beyond `from`, at most the end of the piece, and how far it
+    /// does: Newton inside a shrinking bracket.
+    fn advance(&self, from: f64, length: f64, tolerance: f64) -> (f64, f64) {
         let (mut low, mut high) = (from, self.end);
         let speed = self.speed(from);
         let mut t = from + if speed > 0.0 { length / speed } else { 0.5 * (high - low) };
@@ -90,9 +89,10 @@ impl<const D: usize> Piece<D> {
             if !(t > low && t < high) {
                 t = 0.5 * (low + high);
             }
-            let excess = self.length(from, t) - length;
+            let reached = self.length(from, t);
+            let excess = reached - length;
             if excess.abs() <= tolerance || high - low <= f64::EPSILON * high.abs() {
-                break;
+                return (t, reached);
             }
             if excess > 0.0 {
                 high = t;
@@ -102,7 +102,8 @@ impl<const D: usize> Piece<D> {
             let speed = self.speed(t);
             t = if speed > 0.0 { t - excess / speed } else { 0.5 * (low + high) };
         }
-        t.clamp(from, self.end)
+        let t = t.clamp(from, self.end);
+        (t, self.length(from, t))
     }
 
     fn speed(&self, t: f64) -> f64 {

@@ -107,8 +107,8 @@ impl<V: View> AngleOfView<V> {
             });
         }
         let ray = self.components * pixel.homogeneous();
-        let across = ray.x.hypot(ray.y);
-        if !(across > LEAST_SINE * across.hypot(ray.z)) {
+        let across = (ray.x * ray.x + ray.y * ray.y).sqrt();
+        if !(across > LEAST_SINE * ray.norm()) {
             return Err(GeomError::AtEpipole { view: V::NUMBER, x: pixel.x, y: pixel.y });
         }
         // d atan2(b, a) = (a db - b da) / (a² + b²)

@@ -190,7 +190,7 @@ fn end_penalty(
         let (phi2, g2) = c2.ends[if reversed { 1 - end } else { end }];
         let turn = std::f64::consts::TAU;
         let difference = (phi1 - phi2) - turn * ((phi1 - phi2) / turn).round();
-        let px = std::f64::consts::SQRT_2 * difference.abs() / g1.hypot(g2);
+        let px = std::f64::consts::SQRT_2 * difference.abs() / (g1 * g1 + g2 * g2).sqrt();
         if !free[end] {
             sum += px.min(params.end_limit_px);
             beyond += usize::from(px > params.end_limit_px);

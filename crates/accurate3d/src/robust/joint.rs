@@ -105,6 +105,9 @@ pub(crate) struct JointResult {
     pub(crate) explanation: Explanation,
 }
 
+/// Rounds of crossing the best curve with the others, at most.
+const EXCHANGES: usize = 3;
+
 /// Curves nowhere farther apart than this do not compete, px.
 const RIVAL_PX: f64 = 5.0;
 
@@ -244,6 +247,20 @@ fn choose(
     if !more.is_empty() {
         more.append(&mut finalists);
         finalists = search.finalists(more);
+    }
+    for _ in 0..EXCHANGES {
+        let mut crosses = search.exchanged(&finalists);
+        let Some(best) = finalists.first().map(|best| best.score) else { break };
+        if crosses.is_empty() {
+            break;
+        }
+        fits += crosses.len();
+        crosses.append(&mut finalists);
+        finalists = search.finalists(crosses);
+        // Else the same would be crossed again.
+        if finalists[0].score >= best {
+            break;
+        }
     }
     let is_good = |list: &[Candidate]| list.first().is_some_and(|best| best.is_good(params));
     if !is_good(&finalists) {

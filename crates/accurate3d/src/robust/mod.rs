@@ -3,6 +3,7 @@
 
 mod candidates;
 mod evidence;
+mod exchange;
 mod joint;
 mod repair;
 mod score;

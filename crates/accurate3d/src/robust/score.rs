@@ -129,6 +129,23 @@ impl Candidate {
         candidate
     }
 
+    /// A fit that started from stretches of both: as likely by its walks as they are on average.
+    pub(crate) fn crossed(
+        &self,
+        other: &Self,
+        fit: OutlineFit,
+        rig: &Rig,
+        params: &RobustParams,
+    ) -> Self {
+        let mut cross = self.refitted(fit, rig);
+        let prior = 0.5 * (self.prior + other.prior);
+        cross.score += prior - cross.prior;
+        cross.prior = prior;
+        cross.settings = SETTLED;
+        cross.good = cross.is_good(params);
+        cross
+    }
+
     /// What a reader is told about it.
     pub(crate) fn considered(&self) -> ConsideredCurve {
         const SAMPLES: usize = 200;

@@ -7,7 +7,7 @@ use accurate_match::{FreeEnds, Proposal, ProposeParams, propose_pairs};
 
 use super::RobustParams;
 use super::candidates::{ViewCandidates, free_ends};
-use super::score::{Candidate, Origin};
+use super::score::{Candidate, CutEnds, Origin};
 use super::shape::{Shape, arc_lengths_px, dense, px_per_unit};
 use super::start::{OTHER_PRICES, PRICES, start_from};
 use crate::Error;
@@ -41,17 +41,20 @@ pub(crate) const SETTLED: OutlineFitParams = OutlineFitParams {
 pub(crate) const FINE: OutlineFitParams =
     OutlineFitParams { knot_spacing_px: 4.0, lambda3: 0.03, lambda3_start: 0.03, ..SETTLED };
 
+/// Steps of the last fit before those that find its smoothness too.
+const LAST_ITERATIONS: usize = 3;
+
 /// A margin beyond this is as good as any larger one.
 const CLEAR: f64 = 5.0;
 /// A score so much worse than a good one's is no rival's.
 const BEHIND: f64 = 10.0;
 
 /// How much around the ends of bridges a restart spans smoothly, px.
-const BRIDGED_PX: [f64; 2] = [12.0, 25.0];
+pub(crate) const BRIDGED_PX: [f64; 2] = [12.0, 25.0];
 
 /// Pairs kept at each sieve of the proposals where a good curve is likely among the first; see
 /// [`ProposeParams`].
-const QUICK_KEPT: [usize; 3] = [1000, 80, 50];
+const QUICK_KEPT: [usize; 3] = [600, 24, 20];
 
 /// A pair that was fitted.
 #[derive(Debug, Clone)]
@@ -280,17 +283,11 @@ impl Search<'_> {
     /// smoothly: the rim of what hides the body may have drawn the fit aside. `None` where there are
     /// no bridges.
     fn bridged(&self, candidate: &Candidate, reach_px: f64) -> Option<Curve3> {
-        let (rig, cuts) = (self.rig, &candidate.cuts);
-        if cuts.iter().all(Vec::is_empty) {
+        if candidate.cuts.iter().all(Vec::is_empty) {
             return None;
         }
-        let points = dense(&candidate.fit.curve, rig);
-        let px_per_unit = px_per_unit(&points, rig);
-        let near = |camera: &Camera, cuts: &[[f64; 2]], p: &Point3| {
-            camera
-                .project(p)
-                .is_ok_and(|at| cuts.iter().any(|[x, y]| (at.x - x).hypot(at.y - y) < reach_px))
-        };
+        let points = dense(&candidate.fit.curve, self.rig);
+        let px_per_unit = px_per_unit(&points, self.rig);
         let last = points.len() - 1;
         let arc_px = arc_lengths_px(&points, px_per_unit);
         let (kept, arc_px): (Vec<Point3>, Vec<f64>) = points
@@ -298,13 +295,21 @@ impl Search<'_> {
             .zip(arc_px)
             .enumerate()
             .filter(|(k, (point, _))| {
-                let hidden =
-                    near(rig.camera1(), &cuts[0], point) || near(rig.camera2(), &cuts[1], point);
-                !hidden || *k == 0 || *k == last
+                !self.is_near(&candidate.cuts, point, reach_px) || *k == 0 || *k == last
             })
             .map(|(_, (point, arc))| (*point, arc))
             .unzip();
         start_curve(&kept, &arc_px, OutlineFitParams::DEFAULT.knot_spacing_px).ok()
+    }
+
+    /// Whether a point lies near an end of a bridge in either view.
+    pub(crate) fn is_near(&self, cuts: &CutEnds, point: &Point3, reach_px: f64) -> bool {
+        let near = |camera: &Camera, cuts: &[[f64; 2]]| {
+            camera
+                .project(point)
+                .is_ok_and(|at| cuts.iter().any(|[x, y]| (at.x - x).hypot(at.y - y) < reach_px))
+        };
+        near(self.rig.camera1(), &cuts[0]) || near(self.rig.camera2(), &cuts[1])
     }
 
     /// The candidate with its last, adaptive fit under the given cameras, and what that says about the
@@ -314,7 +319,9 @@ impl Search<'_> {
         candidate: &Candidate,
         given_rig: &Rig,
     ) -> (Candidate, Option<CalibrationEstimate>) {
-        let (start, settings) = (&candidate.fit.curve, &candidate.settings);
+        // The steps of the smoothness move the curve as well.
+        let settings = &OutlineFitParams { iterations: LAST_ITERATIONS, ..candidate.settings };
+        let start = &candidate.fit.curve;
         let (outlines, adaptive) = (self.outlines, AdaptiveParams::DEFAULT);
         let found = match &self.params.calibration {
             Some(priors) => fit_outlines_and_calibration(
@@ -379,8 +386,9 @@ impl Search<'_> {
         if let Some(best) = found.first().filter(|best| best.good).map(|best| best.score) {
             found.retain(|candidate| candidate.score < best + BEHIND);
         }
-        if found.len() == 1 && found[0].is_good(self.params) {
-            // No rival: the last fit carries it on.
+        let good = found.first().is_some_and(|best| best.is_good(self.params));
+        if good && (found.len() == 1 || self.effort == Effort::Quick) {
+            // The last fit carries them on.
             return found;
         }
         let mut to_beat = f64::INFINITY;
