@@ -2,7 +2,7 @@ use accurate_fit::{OutlineFitParams, start_curve};
 use accurate_geom::{Curve3, Point3};
 
 use super::score::Candidate;
-use super::search::{BRIDGED_PX, PLAIN, SAME_PX, Search};
+use super::search::{BRIDGED_PX, Effort, PLAIN, SAME_PX, Search};
 use super::shape::{arc_lengths_px, dense, px_per_unit};
 
 /// Curves run together where they are no farther apart than this, px ...
@@ -11,6 +11,8 @@ const TOGETHER_PX: f64 = 1.5;
 const PARALLEL: f64 = 0.7;
 /// A stretch apart is longer than this, px.
 const APART_PX: usize = 6;
+/// Curves that the best is crossed with where a good curve is likely among the first.
+const QUICKLY: usize = 2;
 /// Stretches that are exchanged between two curves, the longest first.
 const MOST: usize = 3;
 
@@ -23,7 +25,8 @@ impl Search<'_> {
         let points = dense(&best.fit.curve, self.rig);
         let px_per_unit = px_per_unit(&points, self.rig);
         let mut crosses = Vec::new();
-        for other in others {
+        let most = if self.effort == Effort::Quick { QUICKLY } else { others.len() };
+        for other in others.iter().take(most) {
             let theirs = dense(&other.fit.curve, self.rig);
             let is_seen = |point: &Point3| {
                 let [_, reach_px] = BRIDGED_PX;

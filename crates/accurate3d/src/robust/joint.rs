@@ -248,7 +248,8 @@ fn choose(
         more.append(&mut finalists);
         finalists = search.finalists(more);
     }
-    for _ in 0..EXCHANGES {
+    let rounds = if search.effort == Effort::Quick { 1 } else { EXCHANGES };
+    for _ in 0..rounds {
         let mut crosses = search.exchanged(&finalists);
         let Some(best) = finalists.first().map(|best| best.score) else { break };
         if crosses.is_empty() {
