@@ -202,8 +202,10 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         }
         None => (masks, [0, 0]),
     };
+    let robust =
+        RobustParams { exchange: params.robust.exchange && maps.is_none(), ..params.robust };
     let maps = maps.filter(|_| params.robust.by_probability);
-    let result = reconstruct_masks(masks, maps, &pair.rig, &params.robust, &pair.id)?;
+    let result = reconstruct_masks(masks, maps, &pair.rig, &robust, &pair.id)?;
     // The curve was fitted under the corrected camera, if one was asked for.
     let rig = match &result.calibration {
         Some(calibration) => &calibration

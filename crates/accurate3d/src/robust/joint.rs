@@ -46,6 +46,9 @@ pub struct RobustParams {
     /// over gaps by them; else by the masks alone. Off: on the built-in network's maps it places curves
     /// better, but where strays hang on the body it leads some astray (docs/segmentation.md).
     pub by_probability: bool,
+    /// Whether finalists exchange stretches. Never on the masks of a segmentation: what it adds or
+    /// misses makes wrong stretches likely.
+    pub exchange: bool,
     /// How wrong the calibration of view 2 may be; `None`: it is exact. Else a shift of image 2 and a
     /// roll of its camera are unknowns, and the search is repeated with the rig so corrected.
     pub calibration: Option<CalibrationPriors>,
@@ -81,6 +84,7 @@ impl RobustParams {
         good_distance_px: 1.0,
         walk_weight: 0.3,
         by_probability: false,
+        exchange: true,
         calibration: None,
         second_look: SecondLook::InDoubt,
     };
@@ -248,7 +252,11 @@ fn choose(
         more.append(&mut finalists);
         finalists = search.finalists(more);
     }
-    let rounds = if search.effort == Effort::Quick { 1 } else { EXCHANGES };
+    let rounds = match search.effort {
+        _ if !params.exchange => 0,
+        Effort::Quick => 1,
+        Effort::Thorough => EXCHANGES,
+    };
     for _ in 0..rounds {
         let mut crosses = search.exchanged(&finalists);
         let Some(best) = finalists.first().map(|best| best.score) else { break };
