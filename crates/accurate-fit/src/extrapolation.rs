@@ -42,3 +42,47 @@ impl Extrapolation {
         changed(factors, &steps, relaxation)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Largest distance of the logarithms from their limit after `steps`, if each step left to itself
+    /// closes a part of the distance.
+    fn left(steps: usize, extrapolate: bool) -> f64 {
+        const LIMIT: [f64; 3] = [2.0, -1.0, 0.5];
+        const CLOSED: f64 = 0.15;
+        let (mut factors, mut extrapolation) = (vec![1.0; 3], Extrapolation::default());
+        for _ in 0..steps {
+            let changes: Vec<f64> = factors
+                .iter()
+                .zip(LIMIT)
+                .map(|(f, limit)| CLOSED * (limit - f64::ln(*f)))
+                .collect();
+            factors = if extrapolate {
+                extrapolation.next(&factors, &changes, 2.0)
+            } else {
+                changed(&factors, &changes, 2.0)
+            };
+        }
+        factors.iter().zip(LIMIT).map(|(f, limit)| (f.ln() - limit).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_linear_sequence_ends_after_two_steps() {
+        // Steps of one and the same rate: the mixture of two has no change left.
+        assert!(left(2, true) < 1e-9, "{}", left(2, true));
+        // Plain steps leave 0.7 each.
+        assert!((left(2, false) - 2.0 * 0.7 * 0.7).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_at_rest_stays() {
+        let mut extrapolation = Extrapolation::default();
+        let factors = vec![0.5, 3.0];
+        for _ in 0..3 {
+            let next = extrapolation.next(&factors, &[0.0, 0.0], 2.0);
+            assert!(next.iter().zip(&factors).all(|(a, b)| (a - b).abs() < 1e-12));
+        }
+    }
+}
