@@ -73,8 +73,8 @@ impl AdaptiveParams {
 ///
 /// # Source
 /// Dempster, Laird and Rubin, J. R. Statist. Soc. B 39, 1977, for the variance of random effects;
-/// the steps are doubled in the logarithm and extrapolated (Anderson, J. ACM 12, 1965), which takes a
-/// third of the rounds.
+/// the steps are doubled in the logarithm, which converges in half the rounds, and extrapolated
+/// (Anderson, J. ACM 12, 1965).
 ///
 /// # Cost
 /// About twice [`fit_outlines`](crate::fit_outlines).
@@ -179,7 +179,6 @@ pub(crate) fn smooth(
     let spline = &minimiser.current.state.spline;
     let scale = SmoothnessScale::new(spline, minimiser.problem.px_per_unit);
     let settings = final_settings(params, &scale);
-    minimiser.problem.local_smoothness = vec![1.0; spline.control.len() - 3];
     minimiser.refresh(&settings)?;
     // Smoothness must not pull a tip in or a loop open.
     let allowed =
@@ -187,7 +186,7 @@ pub(crate) fn smooth(
     let start = minimiser.current.state.clone();
     // It hardly ever does: to watch every step for it would take half as long again.
     let unwatched = Settings { judged: false, ..settings };
-    let mut steps = alternate(minimiser, &unwatched, adaptive, f64::INFINITY)?;
+    let mut steps = alternate(minimiser, &unwatched, adaptive, allowed)?;
     minimiser.refresh(&settings)?;
     if judge(&minimiser.problem, &minimiser.current).unexplained > allowed {
         minimiser.restart(start);
@@ -197,8 +196,8 @@ pub(crate) fn smooth(
     Ok((steps, inverse))
 }
 
-/// Steps of smoothness and curve from equal smoothness, until the former changes no more; those after
-/// which more than `allowed` is unexplained are taken back. Returns their number.
+/// Steps of smoothness and curve from equal smoothness, until the former changes no more. If they are
+/// judged, those after which more than `allowed` is unexplained are taken back. Returns their number.
 fn alternate(
     minimiser: &mut Minimiser<'_>,
     settings: &Settings,
@@ -227,9 +226,7 @@ fn alternate(
         minimiser.problem.local_smoothness.clone_from(&factors);
         minimiser.step(settings)?;
         steps += 1;
-        if allowed.is_finite()
-            && judge(&minimiser.problem, &minimiser.current).unexplained > allowed
-        {
+        if settings.judged && judge(&minimiser.problem, &minimiser.current).unexplained > allowed {
             minimiser.undo();
             factors = before;
             minimiser.problem.local_smoothness.clone_from(&factors);

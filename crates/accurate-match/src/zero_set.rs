@@ -1,6 +1,6 @@
 use std::ops::RangeInclusive;
 
-use crate::CostModel;
+use crate::{CostModel, longest_chain};
 
 /// Two positions on the curves that lie on one epipolar plane, or as nearly as the curves allow.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,7 +57,7 @@ pub fn zero_crossings(path: &[(usize, usize)], costs: &CostModel) -> Vec<Matched
             crossings.push(MatchedPosition { at1, at2: j as f64, exact: true });
         }
     }
-    let chain = longest_chain(crossings);
+    let chain = advancing(crossings);
     let left = path.iter().filter(|&&(i, j)| !crossed1[i] && !crossed2[j]);
     merge(chain, left.map(|&(i, j)| (i as f64, j as f64)))
 }
@@ -98,28 +98,10 @@ fn crossing(
     places.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.total_cmp(b)))
 }
 
-/// The longest subsequence that advances in both curves.
-fn longest_chain(mut crossings: Vec<MatchedPosition>) -> Vec<MatchedPosition> {
+/// The longest subsequence that advances in both curves, without repeats.
+fn advancing(mut crossings: Vec<MatchedPosition>) -> Vec<MatchedPosition> {
     crossings.sort_by(|a, b| a.at1.total_cmp(&b.at1).then(a.at2.total_cmp(&b.at2)));
-    // Patience sorting: ends[k] is the crossing with the least at2 that ends a chain of k + 1.
-    let mut ends: Vec<usize> = Vec::new();
-    let mut before: Vec<Option<usize>> = Vec::with_capacity(crossings.len());
-    for (k, crossing) in crossings.iter().enumerate() {
-        let place = ends.partition_point(|&end| crossings[end].at2 <= crossing.at2);
-        before.push(place.checked_sub(1).map(|p| ends[p]));
-        if place == ends.len() {
-            ends.push(k);
-        } else {
-            ends[place] = k;
-        }
-    }
-    let mut chain = Vec::with_capacity(ends.len());
-    let mut next = ends.last().copied();
-    while let Some(k) = next {
-        chain.push(crossings[k]);
-        next = before[k];
-    }
-    chain.reverse();
+    let mut chain = longest_chain(&crossings, |a, b| a.at2 <= b.at2);
     chain.dedup_by(|b, a| b.at1 - a.at1 <= SAME && b.at2 - a.at2 <= SAME);
     chain
 }

@@ -1,9 +1,10 @@
-use accurate_fit::{OutlineFitParams, start_curve};
-use accurate_geom::{Curve3, Point3};
+use accurate_geom::Point3;
+use accurate_match::longest_chain;
 
 use super::score::Candidate;
 use super::search::{BRIDGED_PX, Effort, PLAIN, SAME_PX, Search};
-use super::shape::{arc_lengths_px, dense, px_per_unit};
+use super::shape::{dense, px_per_unit};
+use super::start::through;
 
 /// Curves run together where they are no farther apart than this, px ...
 const TOGETHER_PX: f64 = 1.5;
@@ -11,32 +12,55 @@ const TOGETHER_PX: f64 = 1.5;
 const PARALLEL: f64 = 0.7;
 /// A stretch apart is longer than this, px.
 const APART_PX: usize = 6;
-/// Curves that the best is crossed with where a good curve is likely among the first.
-const QUICKLY: usize = 2;
 /// Stretches that are exchanged between two curves, the longest first.
 const MOST: usize = 3;
+/// Rounds, and curves that the best is crossed with in each, at most.
+const QUICKLY: [usize; 2] = [1, 2];
+const THOROUGHLY: [usize; 2] = [3, usize::MAX];
 
 impl Search<'_> {
-    /// Crosses of the best curve with the others: where two differ in several stretches, each may be
-    /// right in one of them, and no pair of walks need be right in all. Not where a walk takes a bridge:
-    /// there the likelier stretch may be the one that the rim of what hides the body draws aside.
-    pub(crate) fn exchanged(&self, finalists: &[Candidate]) -> Vec<Candidate> {
-        let Some((best, others)) = finalists.split_first() else { return Vec::new() };
+    /// The finalists with crosses of the best and the others among them: where two differ in several
+    /// stretches, each may be right in one of them, and no pair of walks need be right in all. Also
+    /// how many crosses were fitted.
+    pub(crate) fn exchanged(&self, mut finalists: Vec<Candidate>) -> (Vec<Candidate>, usize) {
+        let [rounds, others] = match self.effort {
+            Effort::Quick => QUICKLY,
+            Effort::Thorough => THOROUGHLY,
+        };
+        let mut fits = 0;
+        for _ in 0..rounds {
+            let mut crosses = self.crosses(&finalists, others);
+            if crosses.is_empty() {
+                break;
+            }
+            fits += crosses.len();
+            let before = finalists[0].score;
+            crosses.append(&mut finalists);
+            finalists = self.finalists(crosses);
+            // Else the same would be crossed again.
+            if finalists[0].score >= before {
+                break;
+            }
+        }
+        (finalists, fits)
+    }
+
+    /// Not where a walk takes a bridge: there the likelier stretch may be the one that the rim of what
+    /// hides the body draws aside.
+    fn crosses(&self, finalists: &[Candidate], others: usize) -> Vec<Candidate> {
+        let Some((best, rest)) = finalists.split_first() else { return Vec::new() };
         let points = dense(&best.fit.curve, self.rig);
         let px_per_unit = px_per_unit(&points, self.rig);
         let mut crosses = Vec::new();
-        let most = if self.effort == Effort::Quick { QUICKLY } else { others.len() };
-        for other in others.iter().take(most) {
+        for other in rest.iter().take(others) {
             let theirs = dense(&other.fit.curve, self.rig);
             let is_seen = |point: &Point3| {
                 let [_, reach_px] = BRIDGED_PX;
                 [best, other].iter().all(|c| !self.is_near(&c.cuts, point, reach_px))
             };
             for points in crossed(&points, &theirs, px_per_unit, is_seen) {
-                let arc_px = arc_lengths_px(&points, px_per_unit);
-                let spacing_px = OutlineFitParams::DEFAULT.knot_spacing_px;
-                let start = start_curve(&points, &arc_px, spacing_px).ok();
-                let fit = start.and_then(|start: Curve3| self.fit(&start, &PLAIN));
+                let start = through(&points, px_per_unit);
+                let fit = start.and_then(|start| self.fit(&start, &PLAIN));
                 crosses.extend(fit.map(|fit| best.crossed(other, fit, self.rig, self.params)));
             }
         }
@@ -54,8 +78,7 @@ fn crossed(
     is_seen: impl Fn(&Point3) -> bool,
 ) -> Vec<Vec<Point3>> {
     let reversed: Vec<Point3> = theirs.iter().rev().copied().collect();
-    let [straight, back] =
-        [theirs, &reversed].map(|theirs| partners(ours, theirs, TOGETHER_PX / px_per_unit));
+    let [straight, back] = partners(ours, theirs, TOGETHER_PX / px_per_unit);
     let (theirs, partners) =
         if back.len() > straight.len() { (&reversed[..], back) } else { (theirs, straight) };
     let mut apart = stretches_apart(ours, theirs, &partners, SAME_PX / px_per_unit);
@@ -109,50 +132,30 @@ fn stretches_apart(
         .collect()
 }
 
-/// The longest sequence of points of both curves, rising in both, that are near and parallel.
-fn partners(ours: &[Point3], theirs: &[Point3], near: f64) -> Vec<(usize, usize)> {
+/// The longest sequence of points of both curves, rising in both, that are near and parallel: with the
+/// second as it is, and with it reversed.
+fn partners(ours: &[Point3], theirs: &[Point3], near: f64) -> [Vec<(usize, usize)>; 2] {
     let along = |points: &[Point3], k: usize| {
         points[(k + 1).min(points.len() - 1)] - points[k.saturating_sub(1)]
     };
-    let nearest = |i: usize| {
-        let distances = theirs.iter().enumerate().map(|(j, q)| (j, (ours[i] - q).norm_squared()));
-        let (j, squared) = distances.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let [mut straight, mut back] = [Vec::new(), Vec::new()];
+    for (i, p) in ours.iter().enumerate() {
+        let distances = theirs.iter().enumerate().map(|(j, q)| (j, (p - q).norm_squared()));
+        let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((j, _)) = nearest.filter(|(_, squared)| *squared < near * near) else { continue };
         let (a, b) = (along(ours, i), along(theirs, j));
-        let parallel = a.dot(&b) > PARALLEL * a.norm() * b.norm();
-        (squared < near * near && parallel).then_some((i, j))
-    };
-    let pairs: Vec<_> = (0..ours.len()).filter_map(nearest).collect();
-    longest_rise(&pairs)
-}
-
-/// The longest part of a sequence in which the second numbers rise (patience sorting).
-fn longest_rise(pairs: &[(usize, usize)]) -> Vec<(usize, usize)> {
-    // The pair that ends the best rise of each length, and every pair's predecessor.
-    let mut ends: Vec<usize> = Vec::new();
-    let mut before: Vec<Option<usize>> = Vec::with_capacity(pairs.len());
-    for (k, pair) in pairs.iter().enumerate() {
-        let length = ends.partition_point(|&end| pairs[end].1 < pair.1);
-        before.push(length.checked_sub(1).map(|shorter| ends[shorter]));
-        if length == ends.len() {
-            ends.push(k);
-        } else {
-            ends[length] = k;
+        let (cosine, parallel) = (a.dot(&b), PARALLEL * a.norm() * b.norm());
+        if cosine > parallel {
+            straight.push((i, j));
+        } else if -cosine > parallel {
+            back.push((i, theirs.len() - 1 - j));
         }
     }
-    let mut rise = Vec::with_capacity(ends.len());
-    let mut at = ends.last().copied();
-    while let Some(k) = at {
-        rise.push(pairs[k]);
-        at = before[k];
-    }
-    rise.reverse();
-    rise
+    [straight, back].map(|pairs| longest_chain(&pairs, |a, b| a.1 < b.1))
 }
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
 
     /// A straight line along x, 1 unit per px, that leaves it upwards over some ranges.
@@ -184,21 +187,5 @@ mod tests {
         // Nothing in common: one stretch, from end to end.
         let elsewhere: Vec<_> = ours.iter().map(|p| Point3::new(p.x, p.y, 50.0)).collect();
         assert!(crossed(&ours, &elsewhere, 1.0, |_| true).is_empty());
-    }
-
-    proptest! {
-        #[test]
-        fn no_rise_is_longer(values in prop::collection::vec(0usize..8, 0..9)) {
-            let pairs: Vec<_> = values.iter().copied().enumerate().collect();
-            let rise = longest_rise(&pairs);
-            prop_assert!(rise.windows(2).all(|w| w[0].0 < w[1].0 && w[0].1 < w[1].1));
-            let rises = |set: usize| {
-                let chosen: Vec<_> =
-                    values.iter().enumerate().filter(|(k, _)| set >> k & 1 == 1).map(|(_, v)| v).collect();
-                chosen.windows(2).all(|w| w[0] < w[1]).then_some(chosen.len())
-            };
-            let longest = (0..1usize << values.len()).filter_map(rises).max();
-            prop_assert_eq!(Some(rise.len()), longest);
-        }
     }
 }

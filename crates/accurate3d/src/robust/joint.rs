@@ -109,9 +109,6 @@ pub(crate) struct JointResult {
     pub(crate) explanation: Explanation,
 }
 
-/// Rounds of crossing the best curve with the others, at most.
-const EXCHANGES: usize = 3;
-
 /// Curves nowhere farther apart than this do not compete, px.
 const RIVAL_PX: f64 = 5.0;
 
@@ -252,24 +249,10 @@ fn choose(
         more.append(&mut finalists);
         finalists = search.finalists(more);
     }
-    let rounds = match search.effort {
-        _ if !params.exchange => 0,
-        Effort::Quick => 1,
-        Effort::Thorough => EXCHANGES,
-    };
-    for _ in 0..rounds {
-        let mut crosses = search.exchanged(&finalists);
-        let Some(best) = finalists.first().map(|best| best.score) else { break };
-        if crosses.is_empty() {
-            break;
-        }
-        fits += crosses.len();
-        crosses.append(&mut finalists);
-        finalists = search.finalists(crosses);
-        // Else the same would be crossed again.
-        if finalists[0].score >= best {
-            break;
-        }
+    if params.exchange {
+        let (exchanged, crosses) = search.exchanged(finalists);
+        finalists = exchanged;
+        fits += crosses;
     }
     let is_good = |list: &[Candidate]| list.first().is_some_and(|best| best.is_good(params));
     if !is_good(&finalists) {

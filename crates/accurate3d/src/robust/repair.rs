@@ -1,10 +1,11 @@
-use accurate_fit::{OutlineFitParams, start_curve};
+use accurate_fit::OutlineFitParams;
 use accurate_geom::{Curve3, Point3, View1, View2};
 
 use super::candidates::ViewCandidates;
 use super::score::Candidate;
 use super::search::Search;
-use super::shape::{arc_lengths_px, dense, px_per_unit};
+use super::shape::{dense, is_shown_near, px_per_unit};
+use super::start::through;
 use crate::Error;
 
 /// Rounds of repair at most.
@@ -73,10 +74,7 @@ impl Search<'_> {
         let point = curve.at(if at_end { end } else { begin });
         candidate.fit.unexplained.iter().any(|stretch| {
             let camera = if stretch.view == 1 { self.rig.camera1() } else { self.rig.camera2() };
-            camera.project(&point).is_ok_and(|at| {
-                let near = |[x, y]: &[f64; 2]| (at.x - x).hypot(at.y - y) < REACH_PX;
-                stretch.points.iter().any(near)
-            })
+            is_shown_near(camera, &point, &stretch.points, REACH_PX)
         })
     }
 
@@ -144,10 +142,4 @@ fn with_end_moved(
         points.reverse();
     }
     Some(points)
-}
-
-/// A start for a fit through dense points.
-fn through(points: &[Point3], px_per_unit: f64) -> Option<Curve3> {
-    let arc = arc_lengths_px(points, px_per_unit);
-    start_curve(points, &arc, OutlineFitParams::DEFAULT.knot_spacing_px).ok()
 }

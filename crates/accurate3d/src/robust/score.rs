@@ -137,11 +137,8 @@ impl Candidate {
         rig: &Rig,
         params: &RobustParams,
     ) -> Self {
-        let mut cross = self.refitted(fit, rig);
         let prior = 0.5 * (self.prior + other.prior);
-        cross.score += prior - cross.prior;
-        cross.prior = prior;
-        cross.settings = SETTLED;
+        let mut cross = Self { prior, settings: SETTLED, ..self.clone() }.refitted(fit, rig);
         cross.good = cross.is_good(params);
         cross
     }

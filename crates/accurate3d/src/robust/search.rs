@@ -2,13 +2,13 @@ use accurate_fit::{
     AdaptiveParams, CalibrationEstimate, OutlineFit, OutlineFitParams, OutlinePair, fit_outlines,
     fit_outlines_adaptively, fit_outlines_and_calibration, start_curve,
 };
-use accurate_geom::{Camera, Curve3, EpipolarAngle, Pixel, Point3, Rig, View, View1, View2};
+use accurate_geom::{Curve3, EpipolarAngle, Pixel, Point3, Rig, View, View1, View2};
 use accurate_match::{FreeEnds, Proposal, ProposeParams, propose_pairs};
 
 use super::RobustParams;
 use super::candidates::{ViewCandidates, free_ends};
 use super::score::{Candidate, CutEnds, Origin};
-use super::shape::{Shape, arc_lengths_px, dense, px_per_unit};
+use super::shape::{Shape, arc_lengths_px, dense, is_shown_near, px_per_unit};
 use super::start::{OTHER_PRICES, PRICES, start_from};
 use crate::Error;
 
@@ -304,12 +304,8 @@ impl Search<'_> {
 
     /// Whether a point lies near an end of a bridge in either view.
     pub(crate) fn is_near(&self, cuts: &CutEnds, point: &Point3, reach_px: f64) -> bool {
-        let near = |camera: &Camera, cuts: &[[f64; 2]]| {
-            camera
-                .project(point)
-                .is_ok_and(|at| cuts.iter().any(|[x, y]| (at.x - x).hypot(at.y - y) < reach_px))
-        };
-        near(self.rig.camera1(), &cuts[0]) || near(self.rig.camera2(), &cuts[1])
+        let cameras = [self.rig.camera1(), self.rig.camera2()];
+        cameras.iter().zip(cuts).any(|(camera, cuts)| is_shown_near(camera, point, cuts, reach_px))
     }
 
     /// The candidate with its last, adaptive fit under the given cameras, and what that says about the

@@ -89,6 +89,18 @@ pub(crate) fn dense(curve: &Curve3, rig: &Rig) -> Vec<Point3> {
     curve.sample(length_px.ceil().clamp(8.0, 65_536.0) as usize + 1)
 }
 
+/// Whether a camera shows a point nearer than `reach_px` to one of some pixels, `[x, y]`.
+pub(crate) fn is_shown_near(
+    camera: &Camera,
+    point: &Point3,
+    pixels: &[[f64; 2]],
+    reach_px: f64,
+) -> bool {
+    camera
+        .project(point)
+        .is_ok_and(|at| pixels.iter().any(|[x, y]| (at.x - x).hypot(at.y - y) < reach_px))
+}
+
 /// Length of the polyline up to each of its points, px.
 pub(crate) fn arc_lengths_px(points: &[Point3], px_per_unit: f64) -> Vec<f64> {
     let steps = points.windows(2).map(|w| (w[1] - w[0]).norm() * px_per_unit);

@@ -1,6 +1,8 @@
-use accurate_fit::start_curve;
-use accurate_geom::{Curve3, Pixel, Rig, View, View1, View2};
+use accurate_fit::{OutlineFitParams, start_curve};
+use accurate_geom::{Curve3, Pixel, Point3, Rig, View, View1, View2};
 use accurate_match::{FreeEnds, FreeMatchParams, FreeMatcher, MovePrices};
+
+use super::shape::arc_lengths_px;
 
 /// Prices of the alignment that a fit starts from: a trimmed tip costs little, for only ends that a
 /// walk itself doubts may be trimmed.
@@ -41,6 +43,12 @@ pub(crate) fn start_from(
     let points: Vec<_> = matched.points.iter().map(|p| p.position).collect();
     let curve = start_curve(&points, &arc, knot_spacing_px).ok()?;
     Some((curve, matched.mean_epipolar_distance_px))
+}
+
+/// A start through dense points of a curve.
+pub(crate) fn through(points: &[Point3], px_per_unit: f64) -> Option<Curve3> {
+    let arc = arc_lengths_px(points, px_per_unit);
+    start_curve(points, &arc, OutlineFitParams::DEFAULT.knot_spacing_px).ok()
 }
 
 /// Arc length at a fractional index.
