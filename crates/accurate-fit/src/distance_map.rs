@@ -5,8 +5,9 @@ use ndarray::ArrayView2;
 /// The window is the mask's bounding box and a margin, cut at the image border; a position outside
 /// it is first moved to the nearest pixel of the window.
 ///
-/// # Source
-/// Felzenszwalb and Huttenlocher, Distance Transforms of Sampled Functions, 2012 (exact).
+/// Exact. Columns are scanned once; a row when a pixel of it is asked for, as far as something nearer
+/// may lie. A curve is asked about where it passes, on the body or near it, and a map of all pixels costs
+/// more than those few.
 #[derive(Debug, Clone)]
 pub(crate) struct DistanceMap {
     /// Column and row of the window's first pixel.
@@ -14,22 +15,24 @@ pub(crate) struct DistanceMap {
     y0: usize,
     width: usize,
     height: usize,
-    /// Column and row of the nearest foreground pixel, row by row of the window.
-    nearest: Vec<[u32; 2]>,
+    /// Row of the window of the nearest foreground pixel in the same column, row by row; of two the
+    /// upper one.
+    row_of: Vec<u32>,
 }
+
+/// A column without foreground; farther than any row.
+const NONE: u32 = u32::MAX;
 
 impl DistanceMap {
     /// `mask` must have a foreground pixel; `bounds` is its bounding box `[x_min, y_min, x_max, y_max]`.
     ///
-    /// Cost: O(window) time and memory.
+    /// Cost: O(window) time and memory; a look-up O(distance).
     pub(crate) fn new(mask: &ArrayView2<'_, bool>, bounds: [usize; 4], margin: usize) -> Self {
         let (rows, columns) = mask.dim();
         let (x0, y0) = (bounds[0].saturating_sub(margin), bounds[1].saturating_sub(margin));
         let width = (bounds[2] + margin).min(columns - 1) - x0 + 1;
         let height = (bounds[3] + margin).min(rows - 1) - y0 + 1;
 
-        // Nearest foreground row within each column; none = u32::MAX.
-        const NONE: u32 = u32::MAX;
         let mut row_of = vec![NONE; width * height];
         for y in 0..height {
             let (above, rest) = row_of.split_at_mut(y * width);
@@ -51,52 +54,12 @@ impl DistanceMap {
             }
         }
 
-        // Along each row: the lower envelope of the parabolas (x - q)² + g(q)².
-        let mut nearest = vec![[0u32; 2]; width * height];
-        let mut centre: Vec<usize> = Vec::with_capacity(width);
-        let mut from: Vec<f64> = Vec::with_capacity(width);
-        for y in 0..height {
-            centre.clear();
-            from.clear();
-            let row = &row_of[y * width..(y + 1) * width];
-            let height_at = |q: usize| {
-                let dy = f64::from(row[q]) - y as f64;
-                dy * dy + (q * q) as f64
-            };
-            for q in 0..width {
-                if row[q] == NONE {
-                    continue;
-                }
-                loop {
-                    let Some(&last) = centre.last() else {
-                        from.push(f64::NEG_INFINITY);
-                        break;
-                    };
-                    let meet = (height_at(q) - height_at(last)) / (2.0 * (q - last) as f64);
-                    if meet > from[from.len() - 1] {
-                        from.push(meet);
-                        break;
-                    }
-                    centre.pop();
-                    from.pop();
-                }
-                centre.push(q);
-            }
-            let mut k = 0;
-            for x in 0..width {
-                while k + 1 < centre.len() && from[k + 1] <= x as f64 {
-                    k += 1;
-                }
-                let q = centre[k];
-                nearest[y * width + x] = [(x0 + q) as u32, y0 as u32 + row[q]];
-            }
-        }
-        Self { x0, y0, width, height, nearest }
+        Self { x0, y0, width, height, row_of }
     }
 
     /// The foreground pixel nearest to the pixel of the window nearest to `(x, y)`.
     pub(crate) fn nearest(&self, x: f64, y: f64) -> [f64; 2] {
-        self.look_up(x, y, x.round(), y.round()).0
+        self.look_up(x, y, x + 0.5, y + 0.5).0
     }
 
     /// The foreground pixel nearest to `(x, y)`; beyond 1 px perhaps one that is up to 0.1 px farther.
@@ -106,7 +69,7 @@ impl DistanceMap {
     pub(crate) fn nearest_around(&self, x: f64, y: f64) -> [f64; 2] {
         /// The nearest pixel itself is never farther than half a diagonal.
         const CERTAIN_PX: f64 = std::f64::consts::FRAC_1_SQRT_2;
-        let (mut best, mut least) = self.look_up(x, y, x.round(), y.round());
+        let (mut best, mut least) = self.look_up(x, y, x + 0.5, y + 0.5);
         // So far away it is a matter of direction only.
         if least > CERTAIN_PX && least < 8.0 {
             for (cx, cy) in [
@@ -124,15 +87,43 @@ impl DistanceMap {
         best
     }
 
-    /// The foreground pixel nearest to the pixel at `(column, row)`, and its distance from `(x, y)`.
+    /// The foreground pixel nearest to the pixel at `(column, row)`, cut to whole numbers, and its
+    /// distance from `(x, y)`.
     fn look_up(&self, x: f64, y: f64, column: f64, row: f64) -> ([f64; 2], f64) {
         // `as usize` saturates, so that far or non-finite positions stay in the window.
         let column = (column as usize).clamp(self.x0, self.x0 + self.width - 1) - self.x0;
         let row = (row as usize).clamp(self.y0, self.y0 + self.height - 1) - self.y0;
-        let [qx, qy] = self.nearest[row * self.width + column];
-        let found = [f64::from(qx), f64::from(qy)];
+        let [qx, qy] = self.nearest_in_window(column, row);
+        let found = [(self.x0 + qx) as f64, (self.y0 + qy) as f64];
         let (dx, dy) = (found[0] - x, found[1] - y);
         (found, (dx * dx + dy * dy).sqrt())
+    }
+
+    /// Column and row of the foreground pixel nearest to another, all in the window; of equally near
+    /// ones that of the last column.
+    fn nearest_in_window(&self, column: usize, row: usize) -> [usize; 2] {
+        let rows = &self.row_of[row * self.width..(row + 1) * self.width];
+        let squared_in = |q: usize| match rows[q] {
+            // Leaves room for a sum.
+            NONE => u64::MAX / 2,
+            found => u64::from(found.abs_diff(row as u32)).pow(2),
+        };
+        let (mut best, mut least) = (column, squared_in(column));
+        for aside in 1.. {
+            let across = (aside * aside) as u64;
+            let (left, right) = (column.checked_sub(aside), column + aside);
+            if across > least || (left.is_none() && right >= self.width) {
+                break;
+            }
+            // The right one first: it wins a tie, also with the pixel's own column.
+            if right < self.width && squared_in(right) + across <= least {
+                (best, least) = (right, squared_in(right) + across);
+            }
+            if let Some(left) = left.filter(|left| squared_in(*left) + across < least) {
+                (best, least) = (left, squared_in(left) + across);
+            }
+        }
+        [best, rows[best] as usize]
     }
 }
 

@@ -178,17 +178,19 @@ impl OutlineProblem<'_> {
     /// Twice the cost that [`OutlineProblem::assemble`] linearises.
     pub(crate) fn cost(&self, e: &Evaluation, settings: &Settings) -> f64 {
         let squared_scale = settings.scale_px * settings.scale_px;
-        let robust = |r: f64| squared_scale * (r * r / squared_scale).ln_1p();
         let factor = settings.stride as f64;
-        let mut sum = 0.0;
+        let outside_weight = [0, 1].map(|view| self.outside_weight(e, view, settings));
+        let (mut outside, mut robust) = (0.0, LogSum::default());
         for row in e.rows.iter().filter(|row| row.held) {
-            sum += if row.outside {
-                self.outside_weight(e, row.view, settings) * row.distance * row.distance
+            if row.outside {
+                outside += outside_weight[row.view] * row.distance * row.distance;
             } else {
-                factor * robust((row.distance - e.state.half_px[row.view]) * row.precision.sqrt())
-            };
+                let r = row.distance - e.state.half_px[row.view];
+                robust.add(r * r * row.precision / squared_scale);
+            }
         }
-        sum += factor * e.lost as f64 * robust(settings.reach_px);
+        let lost = e.lost as f64 * (settings.reach_px * settings.reach_px / squared_scale).ln_1p();
+        let sum = outside + factor * squared_scale * (robust.total() + lost);
         sum + smoothness(
             &e.state.spline,
             settings.lambda2,
@@ -197,6 +199,7 @@ impl OutlineProblem<'_> {
         )
     }
 
+    /// Weight of a sample of one view's curve outside its mask.
     fn outside_weight(&self, e: &Evaluation, view: usize, settings: &Settings) -> f64 {
         let chords = &e.chords[view];
         settings.outside_weight * chords.length_px() / (chords.points.len() - 1) as f64
@@ -222,6 +225,35 @@ impl OutlineProblem<'_> {
             settings.lambda3,
             &self.local_smoothness,
         );
+    }
+}
+
+/// A sum of `ln(1 + x)`: many factors share one logarithm.
+struct LogSum {
+    sum: f64,
+    product: f64,
+}
+
+impl Default for LogSum {
+    fn default() -> Self {
+        Self { sum: 0.0, product: 1.0 }
+    }
+}
+
+impl LogSum {
+    /// A product beyond this is a logarithm first; far enough from the largest number.
+    const LARGE: f64 = 1e100;
+
+    fn add(&mut self, x: f64) {
+        self.product *= 1.0 + x;
+        if self.product > Self::LARGE {
+            self.sum += self.product.ln();
+            self.product = 1.0;
+        }
+    }
+
+    fn total(self) -> f64 {
+        self.sum + self.product.ln()
     }
 }
 
@@ -282,10 +314,27 @@ pub(crate) fn third_difference(c: &[Vector3<f64>], k: usize) -> Vector3<f64> {
 mod tests {
     use accurate_geom::{Curve3, View1, View2};
     use accurate_synth::{CaseOptions, Family, generate};
+    use proptest::prelude::*;
 
     use super::*;
     use crate::pose::pose;
     use crate::{Outline, OutlinePair};
+
+    proptest! {
+        /// Rounding of each factor is 1.1e-16 of it, of the sum as usual.
+        #[test]
+        fn one_logarithm_of_many_factors_is_the_sum_of_theirs(
+            exponents in prop::collection::vec(-12.0..60.0f64, 0..400),
+        ) {
+            let (mut shared, mut one_by_one) = (LogSum::default(), 0.0);
+            for x in exponents.iter().map(|e| 10f64.powf(*e)) {
+                shared.add(x);
+                one_by_one += x.ln_1p();
+            }
+            let tolerance = exponents.len() as f64 * (1.0 + one_by_one) * 2.0 * f64::EPSILON;
+            prop_assert!((shared.total() - one_by_one).abs() <= tolerance);
+        }
+    }
 
     /// Half the cost is what `assemble` differentiates: by the envelope theorem the motion of the
     /// nearest points does not count, and neither does that of the weights' normals, which are held.

@@ -68,7 +68,8 @@ impl AngleProfile {
                 segment += 1;
             }
             let sample = angle(between(curve, &cumulative, segment, s))?;
-            let jumps = phi.last().map_or(0.0, |last| ((last - sample.phi) / TAU).round());
+            let turns = phi.last().map_or(0.0, |last| (last - sample.phi) / TAU);
+            let jumps = if turns.abs() < 0.5 { 0.0 } else { turns.round() };
             phi.push(sample.phi + TAU * jumps);
             gradient.push(sample.gradient_per_px);
         }
@@ -106,8 +107,10 @@ impl AngleProfile {
         // In samples of the profile.
         let spacing = last / (count - 1).max(1) as f64;
         let at = |x: f64| {
-            let (k, part) = (x.floor(), x.fract());
-            let (a, b) = (self.phi[k as usize], self.phi[x.ceil() as usize]);
+            // Casts cut off: `x` is not negative.
+            let k = x as usize;
+            let part = x - k as f64;
+            let (a, b) = (self.phi[k], self.phi[k + usize::from(part > 0.0)]);
             a + part * (b - a)
         };
         let mut signal = AngleSignal {
@@ -123,11 +126,13 @@ impl AngleProfile {
             let (a, b) = (at(from), at(to));
             let (mut low, mut high) = (a.min(b), a.max(b));
             // Both roundings stay inside the profile: 0 <= from <= to <= last.
-            for &phi in self.phi.get(from.ceil() as usize..=to.floor() as usize).unwrap_or(&[]) {
+            let first = from as usize;
+            let first = first + usize::from(from > first as f64);
+            for &phi in self.phi.get(first..=to as usize).unwrap_or(&[]) {
                 low = low.min(phi);
                 high = high.max(phi);
             }
-            let gradient = self.gradient[(centre.round() as usize).min(self.gradient.len() - 1)];
+            let gradient = self.gradient[((centre + 0.5) as usize).min(self.gradient.len() - 1)];
             signal.push(low, high, gradient);
         }
         Ok(signal)

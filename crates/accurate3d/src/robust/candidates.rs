@@ -5,8 +5,8 @@ use accurate_seg::{
     GapHint, GapParams, Mask, distance_to_background, gap_hints, median_width_px, zhang_suen,
 };
 use accurate_traverse::{
-    GraphEdge, GraphParams, HalfEdge, SkeletonGraph, Walk, WalkEnd, WalkParams, fill_small_holes,
-    k_best_walks_with_reward,
+    GraphEdge, GraphParams, HalfEdge, PointFlags, SkeletonGraph, Walk, WalkEnd, WalkParams,
+    fill_small_holes, k_best_walks_with_reward,
 };
 use ndarray::{Array2, Axis, Slice};
 
@@ -248,6 +248,10 @@ fn cut_to_body(array: &Array2<bool>) -> (Array2<bool>, [f64; 2]) {
     let (rows, columns) = array.dim();
     let (mut top, mut bottom, mut left, mut right) = (rows, 0, columns, 0);
     for (y, row) in array.rows().into_iter().enumerate() {
+        // Most rows are empty or begin in vain: without a branch for each pixel first.
+        if !row.iter().fold(false, |any, set| any | set) {
+            continue;
+        }
         let mut set = row.iter().enumerate().filter(|(_, set)| **set).map(|(x, _)| x);
         if let Some(first) = set.next() {
             (top, bottom) = (top.min(y), bottom.max(y));
@@ -275,14 +279,12 @@ fn median_width(thin: &Mask, radii: &Array2<f64>) -> f64 {
 /// a walk that ends at a junction may be off by its node.
 pub(crate) fn free_ends<V: View>(walk: &Walk<V>) -> FreeEnds {
     const JUNCTION_PX: f64 = 4.0;
-    let spacing = walk.length_px() / (walk.points.len().max(2) - 1) as f64;
-    let reused = |count: usize| count as f64 * spacing;
-    let free = |end: WalkEnd, run: usize| match end {
+    let spacing = || walk.length_px() / (walk.points.len().max(2) - 1) as f64;
+    let free = |end: WalkEnd, flags: &mut dyn Iterator<Item = &PointFlags>| match end {
         WalkEnd::Tip | WalkEnd::Closed => 0.0,
         WalkEnd::Junction => JUNCTION_PX,
-        WalkEnd::OnReusedEdge => reused(run),
+        WalkEnd::OnReusedEdge => flags.take_while(|f| f.reused).count() as f64 * spacing(),
     };
-    let head = walk.flags.iter().take_while(|f| f.reused).count();
-    let tail = walk.flags.iter().rev().take_while(|f| f.reused).count();
-    FreeEnds { begin_px: free(walk.ends[0], head), end_px: free(walk.ends[1], tail) }
+    let begin_px = free(walk.ends[0], &mut walk.flags.iter());
+    FreeEnds { begin_px, end_px: free(walk.ends[1], &mut walk.flags.iter().rev()) }
 }

@@ -4,7 +4,7 @@ use accurate_traverse::Walk;
 use serde::Serialize;
 
 use super::score::Candidate;
-use super::shape::{Shape, px_per_unit};
+use super::shape::{Shape, px_per_unit_along};
 
 /// What bears on whether a chosen curve is the right one, all known without the truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -152,7 +152,7 @@ fn largest_sigma_px(fit: &OutlineFit, rig: &Rig) -> f64 {
         .into_iter()
         .map(|t| covariance.across(curve, t).1.symmetric_eigenvalues().max())
         .fold(0.0, f64::max);
-    variance.sqrt() * px_per_unit(&curve.sample(16), rig)
+    variance.sqrt() * px_per_unit_along(curve, rig)
 }
 
 /// A curve runs along the epipolar lines of both views where its tangent lies in the epipolar plane.

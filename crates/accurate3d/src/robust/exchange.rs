@@ -48,7 +48,10 @@ impl Search<'_> {
     /// Not where a walk takes a bridge: there the likelier stretch may be the one that the rim of what
     /// hides the body draws aside.
     fn crosses(&self, finalists: &[Candidate], others: usize) -> Vec<Candidate> {
-        let Some((best, rest)) = finalists.split_first() else { return Vec::new() };
+        let Some((best, rest)) = finalists.split_first().filter(|(_, rest)| !rest.is_empty())
+        else {
+            return Vec::new();
+        };
         let points = dense(&best.fit.curve, self.rig);
         let px_per_unit = px_per_unit(&points, self.rig);
         let mut crosses = Vec::new();

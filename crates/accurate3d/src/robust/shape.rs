@@ -15,7 +15,7 @@ pub(crate) struct Shape {
 
 impl Shape {
     pub(crate) fn new(curve: &Curve3, rig: &Rig) -> Self {
-        let samples = curve.sample(COMPARED);
+        let samples = Evenly::of(curve).points(COMPARED);
         let px_per_unit = px_per_unit(&samples, rig);
         Self { samples, px_per_unit }
     }
@@ -61,10 +61,15 @@ pub(crate) fn px_per_unit(points: &[Point3], rig: &Rig) -> f64 {
     (one(rig.camera1()) + one(rig.camera2())) / (2 * points.len().max(1)) as f64
 }
 
+/// Mean magnification of both views along a curve.
+pub(crate) fn px_per_unit_along(curve: &Curve3, rig: &Rig) -> f64 {
+    px_per_unit(&Evenly::of(curve).points(16), rig)
+}
+
 /// `∫ min(κ, 0.1 / px) |dθ|`, 1/px: bending energy of a curve that may have cusps.
 pub(crate) fn bending(curve: &Curve3, rig: &Rig) -> f64 {
     const PER_SPAN: usize = 6;
-    let px_per_unit = px_per_unit(&curve.sample(16), rig);
+    let px_per_unit = px_per_unit_along(curve, rig);
     let breakpoints = curve.breakpoints();
     let mut sum = 0.0;
     for pair in breakpoints.windows(2) {
@@ -85,8 +90,60 @@ pub(crate) fn bending(curve: &Curve3, rig: &Rig) -> f64 {
 
 /// Points about 1 px apart along a curve.
 pub(crate) fn dense(curve: &Curve3, rig: &Rig) -> Vec<Point3> {
-    let length_px = curve.arc_length() * px_per_unit(&curve.sample(16), rig);
-    curve.sample(length_px.ceil().clamp(8.0, 65_536.0) as usize + 1)
+    let evenly = Evenly::of(curve);
+    let length_px = evenly.length() * px_per_unit(&evenly.points(16), rig);
+    evenly.points(length_px.ceil().clamp(8.0, 65_536.0) as usize + 1)
+}
+
+/// Points at nearly equal arc lengths, for comparisons: exact ones, whose integrals are found to
+/// rounding, take ten times as long.
+struct Evenly<'a> {
+    curve: &'a Curve3,
+    /// Some places along the curve: parameter, and length of the chords up to there.
+    places: Vec<(f64, f64)>,
+}
+
+impl<'a> Evenly<'a> {
+    fn of(curve: &'a Curve3) -> Self {
+        const PER_SPAN: usize = 4;
+        let breakpoints = curve.breakpoints();
+        let between = breakpoints.windows(2).flat_map(|pair| {
+            let width = (pair[1] - pair[0]) / PER_SPAN as f64;
+            (0..PER_SPAN).map(move |k| pair[0] + k as f64 * width)
+        });
+        let (mut length, mut last) = (0.0, None::<Point3>);
+        let places = between
+            .chain([curve.domain().1])
+            .map(|t| {
+                let here = curve.at(t);
+                length += last.map_or(0.0, |last| (here - last).norm());
+                last = Some(here);
+                (t, length)
+            })
+            .collect();
+        Self { curve, places }
+    }
+
+    fn length(&self) -> f64 {
+        self.places[self.places.len() - 1].1
+    }
+
+    /// So many points, at least 2, both ends among them.
+    fn points(&self, count: usize) -> Vec<Point3> {
+        let (length, mut k) = (self.length(), 0);
+        (0..count)
+            .map(|index| {
+                let target = length * index as f64 / (count - 1) as f64;
+                while k + 2 < self.places.len() && self.places[k + 1].1 < target {
+                    k += 1;
+                }
+                let ((from, before), (to, beyond)) = (self.places[k], self.places[k + 1]);
+                let part =
+                    if beyond > before { (target - before) / (beyond - before) } else { 0.0 };
+                self.curve.at(from + (to - from) * part.min(1.0))
+            })
+            .collect()
+    }
 }
 
 /// Whether a camera shows a point nearer than `reach_px` to one of some pixels, `[x, y]`.
@@ -125,6 +182,22 @@ mod tests {
         let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), 1.2);
         let camera = |r: Matrix3<f64>| Camera::new(k, r, t, size).unwrap();
         Rig::new(camera(Matrix3::identity()), camera(*turn.matrix()), LengthUnit::Unit).unwrap()
+    }
+
+    #[test]
+    fn points_are_nearly_even_and_on_the_curve() {
+        // Knots far apart, and uneven.
+        let at = |t: f64| Point3::new(40.0 * t.cos(), 40.0 * t.sin(), 5.0 * t * t);
+        let points: Vec<_> =
+            (0..=12).map(|k| at(0.25 * f64::from(k) + 0.02 * f64::from(k * k))).collect();
+        let curve = Curve3::interpolate(&points).unwrap();
+        let (found, exact) = (Evenly::of(&curve).points(48), curve.sample(48));
+        let step = curve.arc_length() / 47.0;
+        for (found, exact) in found.iter().zip(&exact) {
+            assert!((found - exact).norm() < 0.05 * step, "{found} {exact}");
+        }
+        assert_eq!((found[0], found[47]), (exact[0], exact[47]));
+        assert!((Evenly::of(&curve).length() / curve.arc_length() - 1.0).abs() < 0.01);
     }
 
     #[test]
