@@ -103,9 +103,12 @@ fn far_pieces<V: View>(
             }
         }
     }
+    let far =
+        radii.iter().zip(&done).enumerate().filter(|(_, (radius, done))| **radius > 0.0 && !**done);
+    let starts: Vec<usize> = far.map(|(place, _)| place).collect();
     let mut pieces = Vec::new();
-    for ((y, x), &radius) in radii.indexed_iter() {
-        if !(radius > 0.0) || done[[y, x]] {
+    for (y, x) in starts.into_iter().map(|place| (place / width, place % width)) {
+        if done[[y, x]] {
             continue;
         }
         let mut piece = vec![(y, x)];
