@@ -46,8 +46,8 @@ pub struct RobustParams {
     /// over gaps by them; else by the masks alone. Off: on the built-in network's maps it places curves
     /// better, but where strays hang on the body it leads some astray (docs/segmentation.md).
     pub by_probability: bool,
-    /// Whether finalists exchange stretches. Never on the masks of a segmentation: what it adds or
-    /// misses makes wrong stretches likely.
+    /// Whether finalists exchange stretches and are tried on other ways through one view. Never on the
+    /// masks of a segmentation: what it adds or misses makes wrong stretches likely.
     pub exchange: bool,
     /// How wrong the calibration of view 2 may be; `None`: it is exact. Else a shift of image 2 and a
     /// roll of its camera are unknowns, and the search is repeated with the rig so corrected.
@@ -73,7 +73,7 @@ impl RobustParams {
         walks: WalkParams::DEFAULT,
         propose: ProposeParams::DEFAULT,
         max_fits: 24,
-        min_fits: 2,
+        min_fits: 1,
         enough_fits: 12,
         clear_lead: 1.5,
         finalists: 6,
@@ -253,6 +253,9 @@ fn choose(
         let (exchanged, crosses) = search.exchanged(finalists);
         finalists = exchanged;
         fits += crosses;
+        let (rerouted, others) = search.rerouted(finalists);
+        finalists = rerouted;
+        fits += others;
     }
     let is_good = |list: &[Candidate]| list.first().is_some_and(|best| best.is_good(params));
     if !is_good(&finalists) {
