@@ -1,6 +1,5 @@
 use accurate_fit::OutlineFitParams;
-use accurate_geom::nalgebra::Point2;
-use accurate_geom::{Camera, Curve3, Pixel, Point3, Polyline, View};
+use accurate_geom::{Camera, Curve3, Pixel, Point2, Point3, Polyline, Rig, View};
 use accurate_match::FreeEnds;
 
 use super::other_ways::{OtherWay, other_ways};
@@ -15,7 +14,7 @@ const QUICKLY: [usize; 2] = [2, 1];
 const THOROUGHLY: [usize; 2] = [12, 3];
 /// Without much effort a curve is left whose score is so much behind the best or more.
 const BEHIND: f64 = 0.5;
-/// The whole body is seen at once as this wide where strands run side by side, px more than it is.
+/// Strands run side by side where their bodies are no farther apart than this, px.
 const APART_PX: f64 = 1.0;
 
 impl Search<'_> {
@@ -51,70 +50,78 @@ impl Search<'_> {
         (finalists, fits)
     }
 
-    /// The candidate on other ways through one view, the most promising first.
+    /// Starts on other ways through one view, the most promising first.
     fn starts_elsewhere<'c>(
         &'c self,
         candidate: &'c Candidate,
     ) -> impl Iterator<Item = Curve3> + 'c {
-        let points = dense(&candidate.fit.curve, self.rig);
-        let cameras = [self.rig.camera1(), self.rig.camera2()];
-        let paths = cameras.map(|camera| seen(camera, &points)?.resample(1.0).ok());
-        let mut ways: Vec<(usize, OtherWay)> = Vec::new();
-        for (view, path) in paths.iter().enumerate() {
-            let reach_px = 2.0 * candidate.fit.half_thickness_px[view] + APART_PX;
-            let others = path.iter().flat_map(|path| other_ways(path.points(), reach_px));
-            ways.extend(others.map(|way| (view, way)));
-        }
-        ways.sort_by(|(_, a), (_, b)| b.promise_px.total_cmp(&a.promise_px));
-        ways.into_iter().filter_map(move |(view, way)| {
-            let [Some(path1), Some(path2)] = &paths else { return None };
-            let mut both = [path1.clone(), path2.clone()];
-            both[view] = Polyline::new(way.path).ok()?.resample(1.0).ok()?;
-            let length_px = paths[view].as_ref()?.length();
-            self.matched_within(&points, &both, view, way.range.map(|k| k as f64), length_px)
+        let shown = Shown::of(dense(&candidate.fit.curve, self.rig), self.rig);
+        shown.into_iter().flat_map(move |shown| {
+            let mut ways: Vec<(usize, OtherWay)> = Vec::new();
+            for (view, path) in shown.paths.iter().enumerate() {
+                let reach_px = 2.0 * candidate.fit.half_thickness_px[view] + APART_PX;
+                ways.extend(other_ways(path.points(), reach_px).into_iter().map(|way| (view, way)));
+            }
+            ways.sort_by(|(_, a), (_, b)| b.promise_px.total_cmp(&a.promise_px));
+            ways.into_iter().filter_map(move |(view, way)| self.matched_within(&shown, view, way))
         })
     }
 
-    /// The start of a fit along `points`, but matched anew within a range of arc length of one view's
-    /// path, which was `length_px` long.
-    fn matched_within(
-        &self,
-        points: &[Point3],
-        paths: &[Polyline<2>; 2],
-        view: usize,
-        range_px: [f64; 2],
-        length_px: f64,
-    ) -> Option<Curve3> {
-        /// How much around the range is matched anew too, px.
+    /// The start of a fit that takes another way through one view: matched anew where it does, along
+    /// the curve elsewhere.
+    fn matched_within(&self, shown: &Shown, view: usize, way: OtherWay) -> Option<Curve3> {
+        /// How much around the other way is matched anew too, px.
         const AROUND_PX: f64 = 6.0;
+        let mut paths = shown.paths.each_ref();
+        let changed = Polyline::new(way.path).ok()?.resample(1.0).ok()?;
+        paths[view] = &changed;
         let (matched, _) = start_from(
             &PRICES,
-            (&pixels(&paths[0]), FreeEnds::NONE),
-            (&pixels(&paths[1]), FreeEnds::NONE),
+            (&pixels(paths[0]), FreeEnds::NONE),
+            (&pixels(paths[1]), FreeEnds::NONE),
             false,
             self.rig,
             OutlineFitParams::DEFAULT.knot_spacing_px,
         )?;
         let matched = dense(&matched, self.rig);
-        let camera = [self.rig.camera1(), self.rig.camera2()][view];
-        let before = range_px[0] - AROUND_PX;
-        let behind = length_px - range_px[1] - AROUND_PX;
+        let [from, to] = way.range.map(|k| k as f64);
+        let before = from - AROUND_PX;
+        let behind = shown.paths[view].length() - to - AROUND_PX;
         // From either end by its own length: within the range they may differ.
-        let cut = |points: &[Point3]| {
-            let path = seen(camera, points)?;
+        let cut = |path: &Polyline<2>| {
             let arc = path.cumulative_lengths();
             let from = arc.partition_point(|s| *s < before);
             let to = arc.partition_point(|s| *s <= path.length() - behind);
-            Some([from, to.max(from)])
+            [from, to.max(from)]
         };
-        let ([a, b], [c, d]) = (cut(points)?, cut(&matched)?);
-        let spliced = [&points[..a], &matched[c..d], &points[b..]].concat();
-        through(&spliced, px_per_unit(points, self.rig))
+        let camera = [self.rig.camera1(), self.rig.camera2()][view];
+        let ([a, b], [c, d]) = (cut(&shown.images[view]), cut(&seen(camera, &matched)?));
+        let spliced = [&shown.points[..a], &matched[c..d], &shown.points[b..]].concat();
+        through(&spliced, shown.px_per_unit)
+    }
+}
+
+/// A curve as both views show it.
+struct Shown {
+    points: Vec<Point3>,
+    px_per_unit: f64,
+    /// The points, by view ...
+    images: [Polyline<2>; 2],
+    /// ... and with a vertex every px.
+    paths: [Polyline<2>; 2],
+}
+
+impl Shown {
+    fn of(points: Vec<Point3>, rig: &Rig) -> Option<Self> {
+        let images = [seen(rig.camera1(), &points)?, seen(rig.camera2(), &points)?];
+        let paths = [images[0].resample(1.0).ok()?, images[1].resample(1.0).ok()?];
+        let px_per_unit = px_per_unit(&points, rig);
+        Some(Self { points, px_per_unit, images, paths })
     }
 }
 
 fn seen(camera: &Camera, points: &[Point3]) -> Option<Polyline<2>> {
-    let path: Option<Vec<Point2<f64>>> = points.iter().map(|p| camera.project(p).ok()).collect();
+    let path: Option<Vec<Point2>> = points.iter().map(|p| camera.project(p).ok()).collect();
     Polyline::new(path?).ok()
 }
 
