@@ -102,16 +102,30 @@ fn value<V>(
     (value.abs() <= LARGEST).then_some(value)
 }
 
+/// What [`MARGIN`] neighbouring rows see of one of `columns`.
+type Window<'a> = &'a [f64; MARGIN];
+
 /// A [`DistanceKind`] in vectors: the operations of [`CostModel::cost`] in their order, hence its
 /// bits.
 pub(super) trait VectorCost<S: Lanes> {
     /// What a vector of rows keeps in registers.
     type Rows: Copy;
 
+    /// The columns this cost needs, out of [`Columns`].
+    type Needed<'a>: Copy;
+
+    /// What all vectors of a band see of them in one step: bounds are checked once for all.
+    type Seen<'a>: Copy;
+
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows;
 
-    /// The costs of these rows; lane `l` at the column whose position is `at + l`.
-    fn cost(simd: S, columns: &Columns, rows: &Self::Rows, at: usize) -> S::f64s;
+    fn needed(columns: &Columns) -> Self::Needed<'_>;
+
+    /// Of a band whose first row is at the column of position `at`.
+    fn seen(needed: Self::Needed<'_>, at: usize) -> Self::Seen<'_>;
+
+    /// The costs of these rows, whose first is row `row` of the band.
+    fn cost(simd: S, seen: Self::Seen<'_>, rows: &Self::Rows, row: usize) -> S::f64s;
 }
 
 #[inline(always)]
@@ -120,6 +134,8 @@ fn linear<S: Lanes>(simd: S, [a, b, c]: [S::f64s; 3], [x, y]: [S::f64s; 2]) -> S
     simd.abs_f64s(simd.add_f64s(products, c))
 }
 
+// Loops, not `from_fn`: a closure would not be compiled for the vectors of `S`.
+
 #[inline(always)]
 fn take<const K: usize, S: Lanes>(
     simd: S,
@@ -127,7 +143,6 @@ fn take<const K: usize, S: Lanes>(
     first: usize,
     at: usize,
 ) -> [S::f64s; K] {
-    // A loop, not `from_fn`: a closure would not be compiled for the vectors of `S`.
     let mut taken = [simd.splat_f64s(0.0); K];
     for k in 0..K {
         taken[k] = simd.load(&from[first + k], at);
@@ -135,11 +150,41 @@ fn take<const K: usize, S: Lanes>(
     taken
 }
 
+#[inline(always)]
+fn slices<const K: usize>(from: &[Vec<f64>; 6], first: usize) -> [&[f64]; K] {
+    let mut slices: [&[f64]; K] = [&[]; K];
+    for k in 0..K {
+        slices[k] = &from[first + k];
+    }
+    slices
+}
+
+#[inline(always)]
+fn windows<const K: usize>(from: [&[f64]; K], at: usize) -> [Window<'_>; K] {
+    let mut windows: [Window<'_>; K] = [&[0.0; MARGIN]; K];
+    for k in 0..K {
+        // The sweep stays within the margins on both sides.
+        windows[k] = &from[k][at..].as_chunks().0[0];
+    }
+    windows
+}
+
+#[inline(always)]
+fn load<const K: usize, S: Lanes>(simd: S, from: [Window<'_>; K], row: usize) -> [S::f64s; K] {
+    let mut loaded = [simd.splat_f64s(0.0); K];
+    for k in 0..K {
+        loaded[k] = simd.load(from[k], row);
+    }
+    loaded
+}
+
 #[derive(Debug, Clone, Copy)]
 pub(super) struct InView1;
 
 impl<S: Lanes> VectorCost<S> for InView1 {
     type Rows = [S::f64s; 2];
+    type Needed<'a> = [&'a [f64]; 3];
+    type Seen<'a> = [Window<'a>; 3];
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
@@ -147,8 +192,18 @@ impl<S: Lanes> VectorCost<S> for InView1 {
     }
 
     #[inline(always)]
-    fn cost(simd: S, columns: &Columns, rows: &Self::Rows, at: usize) -> S::f64s {
-        linear(simd, take(simd, &columns.columns, 2, at), *rows)
+    fn needed(columns: &Columns) -> Self::Needed<'_> {
+        slices(&columns.columns, 2)
+    }
+
+    #[inline(always)]
+    fn seen(needed: Self::Needed<'_>, at: usize) -> Self::Seen<'_> {
+        windows(needed, at)
+    }
+
+    #[inline(always)]
+    fn cost(simd: S, seen: Self::Seen<'_>, rows: &Self::Rows, row: usize) -> S::f64s {
+        linear(simd, load(simd, seen, row), *rows)
     }
 }
 
@@ -157,6 +212,8 @@ pub(super) struct InView2;
 
 impl<S: Lanes> VectorCost<S> for InView2 {
     type Rows = [S::f64s; 3];
+    type Needed<'a> = [&'a [f64]; 2];
+    type Seen<'a> = [Window<'a>; 2];
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
@@ -164,8 +221,18 @@ impl<S: Lanes> VectorCost<S> for InView2 {
     }
 
     #[inline(always)]
-    fn cost(simd: S, columns: &Columns, rows: &Self::Rows, at: usize) -> S::f64s {
-        linear(simd, *rows, take(simd, &columns.columns, 0, at))
+    fn needed(columns: &Columns) -> Self::Needed<'_> {
+        slices(&columns.columns, 0)
+    }
+
+    #[inline(always)]
+    fn seen(needed: Self::Needed<'_>, at: usize) -> Self::Seen<'_> {
+        windows(needed, at)
+    }
+
+    #[inline(always)]
+    fn cost(simd: S, seen: Self::Seen<'_>, rows: &Self::Rows, row: usize) -> S::f64s {
+        linear(simd, *rows, load(simd, seen, row))
     }
 }
 
@@ -174,6 +241,8 @@ pub(super) struct InBothViews;
 
 impl<S: Lanes> VectorCost<S> for InBothViews {
     type Rows = ([S::f64s; 2], [S::f64s; 3]);
+    type Needed<'a> = ([&'a [f64]; 3], [&'a [f64]; 2]);
+    type Seen<'a> = ([Window<'a>; 3], [Window<'a>; 2]);
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
@@ -181,9 +250,19 @@ impl<S: Lanes> VectorCost<S> for InBothViews {
     }
 
     #[inline(always)]
-    fn cost(simd: S, columns: &Columns, rows: &Self::Rows, at: usize) -> S::f64s {
-        let d1 = InView1::cost(simd, columns, &rows.0, at);
-        let d2 = InView2::cost(simd, columns, &rows.1, at);
+    fn needed(columns: &Columns) -> Self::Needed<'_> {
+        (slices(&columns.columns, 2), slices(&columns.columns, 0))
+    }
+
+    #[inline(always)]
+    fn seen(needed: Self::Needed<'_>, at: usize) -> Self::Seen<'_> {
+        (windows(needed.0, at), windows(needed.1, at))
+    }
+
+    #[inline(always)]
+    fn cost(simd: S, seen: Self::Seen<'_>, rows: &Self::Rows, row: usize) -> S::f64s {
+        let d1 = InView1::cost(simd, seen.0, &rows.0, row);
+        let d2 = InView2::cost(simd, seen.1, &rows.1, row);
         let sum = simd.add_f64s(simd.mul_f64s(d1, d1), simd.mul_f64s(d2, d2));
         simd.sqrt_f64s(simd.mul_f64s(sum, simd.splat_f64s(0.5)))
     }
@@ -194,6 +273,8 @@ pub(super) struct Sampson;
 
 impl<S: Lanes> VectorCost<S> for Sampson {
     type Rows = ([S::f64s; 2], [S::f64s; 1]);
+    type Needed<'a> = ([&'a [f64]; 3], [&'a [f64]; 1]);
+    type Seen<'a> = ([Window<'a>; 3], [Window<'a>; 1]);
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
@@ -201,9 +282,19 @@ impl<S: Lanes> VectorCost<S> for Sampson {
     }
 
     #[inline(always)]
-    fn cost(simd: S, columns: &Columns, rows: &Self::Rows, at: usize) -> S::f64s {
-        let d1 = InView1::cost(simd, columns, &rows.0, at);
-        let [gradient1]: [S::f64s; 1] = take(simd, &columns.columns, 5, at);
+    fn needed(columns: &Columns) -> Self::Needed<'_> {
+        (slices(&columns.columns, 2), slices(&columns.columns, 5))
+    }
+
+    #[inline(always)]
+    fn seen(needed: Self::Needed<'_>, at: usize) -> Self::Seen<'_> {
+        (windows(needed.0, at), windows(needed.1, at))
+    }
+
+    #[inline(always)]
+    fn cost(simd: S, seen: Self::Seen<'_>, rows: &Self::Rows, row: usize) -> S::f64s {
+        let d1 = InView1::cost(simd, seen.0, &rows.0, row);
+        let [gradient1]: [S::f64s; 1] = load(simd, seen.1, row);
         let sum = simd.add_f64s(gradient1, rows.1[0]);
         // In the margin both gradients are 0; NaN there would still be a number of no row.
         simd.mul_f64s(d1, simd.sqrt_f64s(simd.div_f64s(gradient1, sum)))

@@ -202,7 +202,8 @@ impl<S: Lanes> On<'_, S> {
         let (n1, n2) = (columns.n1, columns.n2);
         let sweep = Sweep { simd, columns, ties, bound };
         let mut edge = Edge::before_the_first_row(n2);
-        let mut record = Record::default();
+        let mut record =
+            if wanted { Record::of_rows(plan.block_rows.min(n1), n2) } else { Record::default() };
         let mut kept = Vec::new();
         let mut total_cost = f64::INFINITY;
         while edge.row < n1 {
@@ -228,7 +229,7 @@ impl<S: Lanes> On<'_, S> {
             path.push(cell);
             cell = sweep.trace(&record, cell, &mut path);
             for (row, live, values) in kept.into_iter().rev() {
-                drop(std::mem::take(&mut record));
+                record.clear();
                 edge = Edge::before_the_first_row(n2);
                 edge.row = row;
                 edge.values[live.clone()].copy_from_slice(&values);

@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use super::costs::{Columns, VectorCost};
+use super::costs::{Columns, MARGIN, VectorCost};
 use super::lanes::Lanes;
 use crate::TieOrder;
 
@@ -23,7 +23,7 @@ pub(super) struct Edge {
 
 impl Edge {
     pub fn before_the_first_row(n2: usize) -> Self {
-        let values = vec![f64::INFINITY; n2 + super::costs::MARGIN];
+        let values = vec![f64::INFINITY; n2 + MARGIN];
         Self { row: 0, values, live: 0..0 }
     }
 }
@@ -34,6 +34,21 @@ impl Edge {
 pub(super) struct Record {
     bits: Vec<u8>,
     bands: Vec<Band>,
+}
+
+impl Record {
+    /// Room for all cells of `rows` rows. Memory that stays untouched costs nothing.
+    pub fn of_rows(rows: usize, n2: usize) -> Self {
+        let bands = rows.div_ceil(MARGIN);
+        let bits = Vec::with_capacity(bands * (n2 + MARGIN) * (MARGIN / 4));
+        Self { bits, bands: Vec::new() }
+    }
+
+    /// Forgets the bands and keeps their memory.
+    pub fn clear(&mut self) {
+        self.bits.clear();
+        self.bands.clear();
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -126,10 +141,13 @@ impl<S: Lanes> Sweep<'_, S> {
         above_before[0] = simd.shifted_down(simd.splat_f64s(corner), infinite);
         let mut taken = most_steps;
         let mut at = columns.position(first);
+        let needed = C::needed(columns);
+        let bits = if RECORD { &mut record.bits[offset..] } else { &mut [] };
+        let values = &mut edge.values[first..];
         for t in 0..most_steps {
-            let mut neighbour = simd.splat_f64s(edge.values[first + t]);
-            let out = if RECORD { offset + t * step_bytes } else { 0 };
-            let out = if RECORD { &mut record.bits[out..out + step_bytes] } else { &mut [] };
+            let mut neighbour = simd.splat_f64s(values[t]);
+            let out = if RECORD { &mut bits[t * step_bytes..][..step_bytes] } else { &mut [] };
+            let seen = C::seen(needed, at);
             for v in 0..VECTORS {
                 let left = now[v];
                 let up = simd.shifted_down(neighbour, left);
@@ -137,7 +155,7 @@ impl<S: Lanes> Sweep<'_, S> {
                 let diagonal = above_before[v];
                 above_before[v] = up;
                 let least = simd.min_f64s(simd.min_f64s(up, diagonal), left);
-                let cost = C::cost(simd, columns, &rows[v], at + v * S::F64_LANES);
+                let cost = C::cost(simd, seen, &rows[v], v * S::F64_LANES);
                 now[v] = simd.add_f64s(cost, least);
                 if RECORD {
                     let (one, two) = if DIAGONAL_FIRST { (diagonal, up) } else { (up, left) };
@@ -152,7 +170,7 @@ impl<S: Lanes> Sweep<'_, S> {
             }
             at -= 1;
             if t + 1 >= Self::ROWS {
-                edge.values[first + t + 1 - Self::ROWS] = simd.last(now[VECTORS - 1]);
+                values[t + 1 - Self::ROWS] = simd.last(now[VECTORS - 1]);
             }
             if t.is_multiple_of(LOOK_EVERY) && first + t >= edge.live.end && first + t < n2 && t > 0
             {
