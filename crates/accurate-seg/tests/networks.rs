@@ -6,6 +6,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use accurate_seg::network::{
     Engine, Manifest, ModelBundle, ModelError, NetworkOptions, NetworkSegmenter, OrtEngine,
@@ -13,6 +14,7 @@ use accurate_seg::network::{
 };
 use accurate_seg::{Mask, PostProcessing, SegError, Segmenter, unwatched};
 use ndarray::Array2;
+use rayon::prelude::*;
 
 const DARK: &[u8] = include_bytes!("fixtures/dark.onnx");
 const UNET: &[u8] = include_bytes!("fixtures/unet.onnx");
@@ -144,6 +146,23 @@ fn the_bytes_are_the_same_for_any_number_of_threads() {
             assert_eq!(one, of(threads), "{threads} threads of ONNX Runtime");
         }
     }
+}
+
+#[test]
+fn a_worker_that_waits_for_the_network_begins_no_other_image() {
+    let bundle = bundle(UNET, |_| {});
+    let engine = RtenEngine::new(&bundle, 2).unwrap();
+    let input = picture(64, 64);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let (begun, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    pool.install(|| {
+        (0..64).into_par_iter().for_each(|_| {
+            most.fetch_max(begun.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+            engine.logits(&input).unwrap();
+            begun.fetch_sub(1, Ordering::SeqCst);
+        });
+    });
+    assert!(most.into_inner() <= 2);
 }
 
 #[test]

@@ -50,9 +50,12 @@ impl Engine for RtenEngine {
         let pixels = data.as_slice().unwrap_or_default();
         let view = NdTensorView::from_data([1, 1, height, width], pixels);
         let options = RunOptions::default().with_thread_pool(Some(self.pool.clone()));
-        let [output] = self
-            .model
-            .run_n(vec![(self.input, view.into())], [self.output], Some(options))
+        let run =
+            || self.model.run_n(vec![(self.input, view.into())], [self.output], Some(options));
+        // On a thread of its own, which only waits: a worker of the caller's pool would begin other
+        // work of its pool meanwhile, the next image, and the next within that one.
+        let [output] = std::thread::scope(|scope| scope.spawn(run).join())
+            .map_err(|_| refuse("it panicked".to_owned()))?
             .map_err(|error| refuse(error.to_string()))?;
         let shape = output.shape().to_vec();
         let data: Vec<f32> = output

@@ -43,8 +43,8 @@ pub struct RobustParams {
     /// Weight of the walks' own cost in the final choice.
     pub walk_weight: f64,
     /// Whether a pair from images is judged by the probability maps themselves, and walks are led
-    /// over gaps by them; else by the masks alone. Off: on the built-in network's maps it places curves
-    /// better, but where strays hang on the body it leads some astray (docs/segmentation.md).
+    /// over gaps by them; else by the masks alone. On the built-in network's maps more curves are
+    /// right, and they are placed better (docs/segmentation.md).
     pub by_probability: bool,
     /// Whether finalists exchange stretches and are tried on other ways through one view. Never on the
     /// masks of a segmentation: what it adds or misses makes wrong stretches likely.
@@ -83,7 +83,7 @@ impl RobustParams {
         good_chi_per_point: 0.062,
         good_distance_px: 1.0,
         walk_weight: 0.3,
-        by_probability: false,
+        by_probability: true,
         exchange: true,
         calibration: None,
         second_look: SecondLook::InDoubt,
