@@ -40,7 +40,7 @@ pub use case::{SynthCase, TRUTH_POINTS, generate};
 pub use damage::Disc;
 pub use domain::{
     TUBE_RADIUS_PX, VisiblePiece, XRAY_VERSION, XrayDomain, XraySample, draw_xray,
-    draw_xray_held_out, draw_xray_onto,
+    draw_xray_held_out, draw_xray_onto, draw_xray_phantom,
 };
 pub use error::SynthError;
 pub use family::{Family, UnknownFamily};

@@ -1,11 +1,12 @@
 //! A segmentation network on labelled X-ray images: its scores, and the post-processing that suits it.
 //!
-//! `cargo run --release -p accurate3d --features rten --example segmentation_study -- WHAT MODEL SEED COUNT [IMAGE...]`
+//! `cargo run --release -p accurate3d --features rten --example segmentation_study -- WHAT MODEL SEED COUNT [GENERATOR | IMAGE...]`
 //!
 //! WHAT is `score` (recall, precision and clDice at 2 px, with the model's own post-processing) or
 //! `tune` (the same over a grid of thresholds, smallest pieces and spurs; the best are printed last;
-//! seed 1500 is for this). With images, wires are drawn onto their middle squares instead of onto
-//! generated anatomy, and COUNT images are made of them in turn.
+//! seed 1500 is for this). GENERATOR is `training` (the default), `held-out` or `phantom`. With images, wires
+//! are drawn onto their middle squares instead of onto generated anatomy, and COUNT images are made of
+//! them in turn.
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;
@@ -17,7 +18,9 @@ use accurate3d::seg::network::{
     MAX_MODEL_BYTES, ModelBundle, NetworkOptions, NetworkSegmenter, RtenEngine,
 };
 use accurate3d::seg::{Mask, PostProcessing, Segmenter, unwatched, zhang_suen};
-use accurate3d::synth::{XrayDomain, XraySample, draw_xray, draw_xray_onto};
+use accurate3d::synth::{
+    XrayDomain, XraySample, draw_xray, draw_xray_held_out, draw_xray_onto, draw_xray_phantom,
+};
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -28,7 +31,7 @@ const TOLERANCE_PX: f64 = 2.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [what, model, seed, count, backgrounds @ ..] = args.as_slice() else {
+    let [what, model, seed, count, images @ ..] = args.as_slice() else {
         return Err("give score or tune, a model, a seed and a number of images".into());
     };
     let (seed, count): (u64, u64) = (seed.parse()?, count.parse()?);
@@ -36,12 +39,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let own = bundle.manifest().postprocessing;
     let engine = Box::new(RtenEngine::new(&bundle, rayon::current_num_threads())?);
     let segmenter = NetworkSegmenter::new(&bundle, engine, NetworkOptions::DEFAULT)?;
-    let backgrounds: Vec<Array2<u8>> =
-        backgrounds.iter().map(|file| square_of(Path::new(file))).collect::<Result<_, _>>()?;
+    let images = Images::of(images)?;
 
     let mut seen = Vec::new();
     for index in 0..count {
-        let sample = sample(seed, index, &backgrounds)?;
+        let sample = images.sample(seed, index)?;
         if sample.mask.iter().any(|set| *set) {
             let image = sample.image.mapv(f32::from);
             seen.push((segmenter.segment(&image, &unwatched)?.probability, sample.mask));
@@ -56,12 +58,41 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn sample(seed: u64, index: u64, onto: &[Array2<u8>]) -> Result<XraySample, Box<dyn Error>> {
-    let domain = XrayDomain { side_px: SIDE as u32, ..XrayDomain::default() };
-    Ok(match onto.len() as u64 {
-        0 => draw_xray(&domain, seed, index)?,
-        n => draw_xray_onto(&domain, &onto[(index % n) as usize], seed, index)?,
-    })
+/// What the images are.
+enum Images {
+    Training,
+    HeldOut,
+    Phantom,
+    /// Wires on these squares.
+    Onto(Vec<Array2<u8>>),
+}
+
+impl Images {
+    fn of(args: &[String]) -> Result<Self, Box<dyn Error>> {
+        Ok(match args.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+            [] | ["training"] => Self::Training,
+            ["held-out"] => Self::HeldOut,
+            ["phantom"] => Self::Phantom,
+            files => {
+                let squares = files.iter().map(|file| square_of(Path::new(file)));
+                Self::Onto(squares.collect::<Result<_, _>>()?)
+            }
+        })
+    }
+
+    fn sample(&self, seed: u64, index: u64) -> Result<XraySample, Box<dyn Error>> {
+        let side = SIDE as u32;
+        let domain = XrayDomain { side_px: side, ..XrayDomain::default() };
+        Ok(match self {
+            Self::Training => draw_xray(&domain, seed, index)?,
+            Self::HeldOut => draw_xray_held_out(side, seed, index)?,
+            Self::Phantom => draw_xray_phantom(side, seed, index)?,
+            Self::Onto(squares) => {
+                let square = &squares[(index % squares.len() as u64) as usize];
+                draw_xray_onto(&domain, square, seed, index)?
+            }
+        })
+    }
 }
 
 /// The middle of an image, 8 bits from its darkest to its brightest pixel.

@@ -60,7 +60,8 @@ pub struct XrayArgs {
     /// A contact sheet (PNG): every image beside itself with its label.
     #[arg(long, value_name = "PNG")]
     pub sheet: Option<PathBuf>,
-    /// Which generator draws: `held-out` shares no model with `training` and is for evaluation.
+    /// Which generator draws: `held-out` and `phantom` share no model with `training` and are for
+    /// evaluation.
     #[arg(long, value_enum, default_value_t = XrayGenerator::Training)]
     pub generator: XrayGenerator,
     /// Draw wires onto these grey images instead (evaluation): image i onto file i modulo their
@@ -91,6 +92,8 @@ pub enum XrayGenerator {
     Training,
     /// Another background, wire, blur and noise.
     HeldOut,
+    /// Wires in a transparent vessel phantom.
+    Phantom,
 }
 
 /// The two kinds of ordered points a generated case has.

@@ -5,7 +5,8 @@ use accurate3d::io::{
     hash_file, read_grey, remove_unfinished, write_json, write_npy_u8, write_rgb,
 };
 use accurate3d::synth::{
-    SynthError, XRAY_VERSION, XrayDomain, XraySample, draw_xray, draw_xray_held_out, draw_xray_onto,
+    SynthError, XRAY_VERSION, XrayDomain, XraySample, draw_xray, draw_xray_held_out,
+    draw_xray_onto, draw_xray_phantom,
 };
 use indicatif::ProgressBar;
 use ndarray::{Array2, Array4, Axis};
@@ -35,6 +36,7 @@ pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
     let draw = |index: u64| match (args.generator, backgrounds.len() as u64) {
         (XrayGenerator::Training, 0) => draw_xray(&domain, args.seed, index),
         (XrayGenerator::HeldOut, _) => draw_xray_held_out(args.size, args.seed, index),
+        (XrayGenerator::Phantom, _) => draw_xray_phantom(args.size, args.seed, index),
         (XrayGenerator::Training, files) => {
             draw_xray_onto(&domain, &backgrounds[(index % files) as usize], args.seed, index)
         }
@@ -78,6 +80,7 @@ fn generator_name(args: &XrayArgs) -> Result<String, Failure> {
         return Ok(match args.generator {
             XrayGenerator::Training => "xray".to_owned(),
             XrayGenerator::HeldOut => "xray-held-out".to_owned(),
+            XrayGenerator::Phantom => "xray-phantom".to_owned(),
         });
     }
     let hashes: Vec<_> = args.onto.iter().map(|p| hash_file(p)).collect::<Result<_, _>>()?;

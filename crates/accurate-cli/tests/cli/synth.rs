@@ -64,9 +64,11 @@ fn a_folder_of_another_set_and_a_size_that_cannot_be_are_refused() {
     let (code, said) = failure(xray(dir.path(), "4", "1").args(["--first", "3"]));
     assert_eq!(code, 2, "{said}");
     assert!(said.contains("another set") && said.contains("first 0"), "{said}");
-    // The other generator's images are another set too.
-    let (code, said) = failure(xray(dir.path(), "4", "1").args(["--generator", "held-out"]));
-    assert!(code == 2 && said.contains("another set"), "{said}");
+    // The other generators' images are other sets too.
+    for generator in ["held-out", "phantom"] {
+        let (code, said) = failure(xray(dir.path(), "4", "1").args(["--generator", generator]));
+        assert!(code == 2 && said.contains("another set"), "{said}");
+    }
     let other = dir.path().join("other");
     let mut command = accurate();
     command.args(["synth", "xray", "--size", "8", "--shards"]).arg(&other);

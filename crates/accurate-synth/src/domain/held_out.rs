@@ -18,7 +18,7 @@ use crate::mask::covered;
 use crate::rng::named_rng;
 
 /// Distance of the vertices of a wire, px.
-const STEP_PX: f64 = 0.5;
+pub(super) const STEP_PX: f64 = 0.5;
 
 /// Image `index` of the set `seed` of the held-out generator.
 ///
@@ -134,16 +134,17 @@ impl Ellipsoid {
     }
 }
 
-/// A chain of clothoids whose width varies, with a coil at its tip.
-struct Wire {
-    points: Vec<Point2>,
-    width_px: f64,
+/// A wire whose width varies, with a coil at its tip.
+pub(super) struct Wire {
+    pub points: Vec<Point2>,
+    pub width_px: f64,
     wave: (f64, f64, f64),
     coil_from_px: f64,
     coil_pitch_px: f64,
 }
 
 impl Wire {
+    /// A chain of clothoids.
     fn draw(rng: &mut ChaCha8Rng, side: f64) -> Self {
         let width_px = rng.random_range(1.2..7.0);
         let mut points = clothoids(rng, side);
@@ -155,6 +156,11 @@ impl Wire {
             }
             points = clothoids(rng, side);
         }
+        Self::along(rng, width_px, points)
+    }
+
+    /// Along vertices [`STEP_PX`] apart.
+    pub fn along(rng: &mut ChaCha8Rng, width_px: f64, points: Vec<Point2>) -> Self {
         let length_px = (points.len() - 1) as f64 * STEP_PX;
         let wave =
             (rng.random_range(0.0..0.2), rng.random_range(60.0..200.0), rng.random_range(0.0..TAU));
@@ -168,14 +174,14 @@ impl Wire {
         }
     }
 
-    fn radius_px(&self, s: f64) -> f64 {
+    pub fn radius_px(&self, s: f64) -> f64 {
         let (amplitude, period, phase) = self.wave;
         (0.5 * self.width_px * (1.0 + amplitude * (TAU * s / period + phase).sin())).max(0.5)
     }
 
     /// Adds a flat profile with edges one pixel soft: the largest of what each vertex covers, so
     /// that strands that cross do not add up (unlike the first generator's).
-    fn add_to(&self, shadow: &mut Array2<f64>, dense: f64) {
+    pub fn add_to(&self, shadow: &mut Array2<f64>, dense: f64) {
         let (height, width) = shadow.dim();
         for (k, at) in self.points.iter().enumerate() {
             let s = k as f64 * STEP_PX;
@@ -222,7 +228,7 @@ fn round_field(rng: &mut ChaCha8Rng, side: f64) -> Option<(Point2, f64)> {
 }
 
 /// Disc blur, correlated noise, a linear window between extremes, eight bits.
-fn expose(
+pub(super) fn expose(
     rng: &mut ChaCha8Rng,
     depth: &Array2<f64>,
     field: Option<(Point2, f64)>,

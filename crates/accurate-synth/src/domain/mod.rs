@@ -11,6 +11,7 @@ mod jpeg;
 mod label;
 mod of_pair;
 mod overlay;
+mod phantom;
 mod stroke;
 mod target;
 mod wander;
@@ -26,6 +27,7 @@ use rand_chacha::ChaCha8Rng;
 pub use composite::draw_xray_onto;
 pub use held_out::draw_xray_held_out;
 pub use label::{TUBE_RADIUS_PX, VisiblePiece};
+pub use phantom::draw_xray_phantom;
 
 use crate::SynthError;
 use crate::options::within;
