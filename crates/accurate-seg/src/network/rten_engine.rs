@@ -1,5 +1,6 @@
 use std::fmt;
 use std::sync::Arc;
+use std::thread::{self, ScopedJoinHandle};
 
 use ndarray::{Array2, Array3};
 use rten::{Model, ModelOptions, NodeId, RunOptions, ThreadPool};
@@ -54,7 +55,11 @@ impl Engine for RtenEngine {
             || self.model.run_n(vec![(self.input, view.into())], [self.output], Some(options));
         // On a thread of its own, which only waits: a worker of the caller's pool would begin other
         // work of its pool meanwhile, the next image, and the next within that one.
-        let [output] = std::thread::scope(|scope| scope.spawn(run).join())
+        let ran = thread::scope(|scope| {
+            thread::Builder::new().spawn_scoped(scope, run).map(ScopedJoinHandle::join)
+        });
+        let [output] = ran
+            .map_err(|error| refuse(format!("no thread for it: {error}")))?
             .map_err(|_| refuse("it panicked".to_owned()))?
             .map_err(|error| refuse(error.to_string()))?;
         let shape = output.shape().to_vec();
