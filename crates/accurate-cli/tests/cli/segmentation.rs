@@ -92,13 +92,22 @@ fn images_are_segmented_and_reconstructed() {
         command.args(["--json", "reconstruct", "-i", "image", "-m", method, "--model"]).arg(&model);
         let text = stdout(command.arg("-o").arg(&out).arg(&pair));
         let result: Value = serde_json::from_str(&text).unwrap();
-        // The mask is the sample's own, so that the curve is that of the mask.
+        // The mask is the sample's own, so that the curve is that of the mask; in `accurate` mode it is
+        // fitted to the map, which shows the mask. Curves half a pixel apart (of one unit here) have
+        // scores that differ by no more.
         let mut command = accurate();
         command.args(["--json", "reconstruct", "-i", "mask", "-m", method, "-o"]);
         let text = stdout(command.arg(dir.path().join("mask")).arg(samples().join("bend")));
         let of_mask: Value = serde_json::from_str(&text).unwrap();
         assert!(of_mask["scores"]["overall"].is_number());
-        assert_eq!(result["scores"], of_mask["scores"], "{method}");
+        if method == "paper" {
+            assert_eq!(result["scores"], of_mask["scores"]);
+        }
+        for score in ["accuracy", "completeness", "overall", "max_error"] {
+            let of = |result: &Value| result["scores"][score].as_f64().unwrap();
+            let apart = (of(&result) - of(&of_mask)).abs();
+            assert!(apart < 0.5, "{method}, {score}: {apart}");
+        }
         let by = result["parameters"]["segmentation"].as_str().unwrap();
         assert!(by.contains("dark pixels") && by.contains("rten"), "{by}");
         assert_eq!(result["input"], "image");

@@ -112,20 +112,47 @@ pub(super) trait VectorCost<S: Lanes> {
     type Rows: Copy;
 
     /// The columns this cost needs, out of [`Columns`].
-    type Needed<'a>: Copy;
-
-    /// What all vectors of a band see of them in one step: bounds are checked once for all.
-    type Seen<'a>: Copy;
+    type Needed<'a>: Windowed;
 
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows;
 
     fn needed(columns: &Columns) -> Self::Needed<'_>;
 
-    /// Of a band whose first row is at the column of position `at`.
-    fn seen(needed: Self::Needed<'_>, at: usize) -> Self::Seen<'_>;
+    /// The costs of these rows, whose first is row `row` of the band, which sees `seen`.
+    fn cost(simd: S, seen: Seen<Self::Needed<'_>>, rows: &Self::Rows, row: usize) -> S::f64s;
+}
 
-    /// The costs of these rows, whose first is row `row` of the band.
-    fn cost(simd: S, seen: Self::Seen<'_>, rows: &Self::Rows, row: usize) -> S::f64s;
+/// Columns of which a band sees a window at every step: bounds are checked once for all its vectors.
+pub(super) trait Windowed: Copy {
+    type Seen: Copy;
+
+    /// Of a band whose first row is at the column of position `at`.
+    fn seen(self, at: usize) -> Self::Seen;
+}
+
+type Seen<N> = <N as Windowed>::Seen;
+
+impl<'a, const K: usize> Windowed for [&'a [f64]; K] {
+    type Seen = [Window<'a>; K];
+
+    #[inline(always)]
+    fn seen(self, at: usize) -> Self::Seen {
+        let mut windows: Self::Seen = [&[0.0; MARGIN]; K];
+        for k in 0..K {
+            // The sweep stays within the margins on both sides.
+            windows[k] = &self[k][at..].as_chunks().0[0];
+        }
+        windows
+    }
+}
+
+impl<A: Windowed, B: Windowed> Windowed for (A, B) {
+    type Seen = (A::Seen, B::Seen);
+
+    #[inline(always)]
+    fn seen(self, at: usize) -> Self::Seen {
+        (self.0.seen(at), self.1.seen(at))
+    }
 }
 
 #[inline(always)]
@@ -160,16 +187,6 @@ fn slices<const K: usize>(from: &[Vec<f64>; 6], first: usize) -> [&[f64]; K] {
 }
 
 #[inline(always)]
-fn windows<const K: usize>(from: [&[f64]; K], at: usize) -> [Window<'_>; K] {
-    let mut windows: [Window<'_>; K] = [&[0.0; MARGIN]; K];
-    for k in 0..K {
-        // The sweep stays within the margins on both sides.
-        windows[k] = &from[k][at..].as_chunks().0[0];
-    }
-    windows
-}
-
-#[inline(always)]
 fn load<const K: usize, S: Lanes>(simd: S, from: [Window<'_>; K], row: usize) -> [S::f64s; K] {
     let mut loaded = [simd.splat_f64s(0.0); K];
     for k in 0..K {
@@ -184,7 +201,6 @@ pub(super) struct InView1;
 impl<S: Lanes> VectorCost<S> for InView1 {
     type Rows = [S::f64s; 2];
     type Needed<'a> = [&'a [f64]; 3];
-    type Seen<'a> = [Window<'a>; 3];
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
@@ -197,12 +213,7 @@ impl<S: Lanes> VectorCost<S> for InView1 {
     }
 
     #[inline(always)]
-    fn seen(needed: Self::Needed<'_>, at: usize) -> Self::Seen<'_> {
-        windows(needed, at)
-    }
-
-    #[inline(always)]
-    fn cost(simd: S, seen: Self::Seen<'_>, rows: &Self::Rows, row: usize) -> S::f64s {
+    fn cost(simd: S, seen: Seen<Self::Needed<'_>>, rows: &Self::Rows, row: usize) -> S::f64s {
         linear(simd, load(simd, seen, row), *rows)
     }
 }
@@ -213,7 +224,6 @@ pub(super) struct InView2;
 impl<S: Lanes> VectorCost<S> for InView2 {
     type Rows = [S::f64s; 3];
     type Needed<'a> = [&'a [f64]; 2];
-    type Seen<'a> = [Window<'a>; 2];
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
@@ -226,12 +236,7 @@ impl<S: Lanes> VectorCost<S> for InView2 {
     }
 
     #[inline(always)]
-    fn seen(needed: Self::Needed<'_>, at: usize) -> Self::Seen<'_> {
-        windows(needed, at)
-    }
-
-    #[inline(always)]
-    fn cost(simd: S, seen: Self::Seen<'_>, rows: &Self::Rows, row: usize) -> S::f64s {
+    fn cost(simd: S, seen: Seen<Self::Needed<'_>>, rows: &Self::Rows, row: usize) -> S::f64s {
         linear(simd, *rows, load(simd, seen, row))
     }
 }
@@ -242,7 +247,6 @@ pub(super) struct InBothViews;
 impl<S: Lanes> VectorCost<S> for InBothViews {
     type Rows = ([S::f64s; 2], [S::f64s; 3]);
     type Needed<'a> = ([&'a [f64]; 3], [&'a [f64]; 2]);
-    type Seen<'a> = ([Window<'a>; 3], [Window<'a>; 2]);
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
@@ -255,12 +259,7 @@ impl<S: Lanes> VectorCost<S> for InBothViews {
     }
 
     #[inline(always)]
-    fn seen(needed: Self::Needed<'_>, at: usize) -> Self::Seen<'_> {
-        (windows(needed.0, at), windows(needed.1, at))
-    }
-
-    #[inline(always)]
-    fn cost(simd: S, seen: Self::Seen<'_>, rows: &Self::Rows, row: usize) -> S::f64s {
+    fn cost(simd: S, seen: Seen<Self::Needed<'_>>, rows: &Self::Rows, row: usize) -> S::f64s {
         let d1 = InView1::cost(simd, seen.0, &rows.0, row);
         let d2 = InView2::cost(simd, seen.1, &rows.1, row);
         let sum = simd.add_f64s(simd.mul_f64s(d1, d1), simd.mul_f64s(d2, d2));
@@ -274,7 +273,6 @@ pub(super) struct Sampson;
 impl<S: Lanes> VectorCost<S> for Sampson {
     type Rows = ([S::f64s; 2], [S::f64s; 1]);
     type Needed<'a> = ([&'a [f64]; 3], [&'a [f64]; 1]);
-    type Seen<'a> = ([Window<'a>; 3], [Window<'a>; 1]);
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
@@ -287,12 +285,7 @@ impl<S: Lanes> VectorCost<S> for Sampson {
     }
 
     #[inline(always)]
-    fn seen(needed: Self::Needed<'_>, at: usize) -> Self::Seen<'_> {
-        (windows(needed.0, at), windows(needed.1, at))
-    }
-
-    #[inline(always)]
-    fn cost(simd: S, seen: Self::Seen<'_>, rows: &Self::Rows, row: usize) -> S::f64s {
+    fn cost(simd: S, seen: Seen<Self::Needed<'_>>, rows: &Self::Rows, row: usize) -> S::f64s {
         let d1 = InView1::cost(simd, seen.0, &rows.0, row);
         let [gradient1]: [S::f64s; 1] = load(simd, seen.1, row);
         let sum = simd.add_f64s(gradient1, rows.1[0]);

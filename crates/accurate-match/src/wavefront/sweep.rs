@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use super::costs::{Columns, MARGIN, VectorCost};
+use super::costs::{Columns, MARGIN, VectorCost, Windowed};
 use super::lanes::Lanes;
 use crate::TieOrder;
 
@@ -147,7 +147,7 @@ impl<S: Lanes> Sweep<'_, S> {
         for t in 0..most_steps {
             let mut neighbour = simd.splat_f64s(values[t]);
             let out = if RECORD { &mut bits[t * step_bytes..][..step_bytes] } else { &mut [] };
-            let seen = C::seen(needed, at);
+            let seen = needed.seen(at);
             for v in 0..VECTORS {
                 let left = now[v];
                 let up = simd.shifted_down(neighbour, left);
