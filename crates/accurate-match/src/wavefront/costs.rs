@@ -164,20 +164,6 @@ fn linear<S: Lanes>(simd: S, [a, b, c]: [S::f64s; 3], [x, y]: [S::f64s; 2]) -> S
 // Loops, not `from_fn`: a closure would not be compiled for the vectors of `S`.
 
 #[inline(always)]
-fn take<const K: usize, S: Lanes>(
-    simd: S,
-    from: &[Vec<f64>; 6],
-    first: usize,
-    at: usize,
-) -> [S::f64s; K] {
-    let mut taken = [simd.splat_f64s(0.0); K];
-    for k in 0..K {
-        taken[k] = simd.load(&from[first + k], at);
-    }
-    taken
-}
-
-#[inline(always)]
 fn slices<const K: usize>(from: &[Vec<f64>; 6], first: usize) -> [&[f64]; K] {
     let mut slices: [&[f64]; K] = [&[]; K];
     for k in 0..K {
@@ -186,11 +172,17 @@ fn slices<const K: usize>(from: &[Vec<f64>; 6], first: usize) -> [&[f64]; K] {
     slices
 }
 
+/// Of whole columns or of what a band sees of them: the length of the latter is known, so that nothing
+/// is checked.
 #[inline(always)]
-fn load<const K: usize, S: Lanes>(simd: S, from: [Window<'_>; K], row: usize) -> [S::f64s; K] {
+fn load<const K: usize, S: Lanes>(
+    simd: S,
+    from: [&(impl AsRef<[f64]> + ?Sized); K],
+    at: usize,
+) -> [S::f64s; K] {
     let mut loaded = [simd.splat_f64s(0.0); K];
     for k in 0..K {
-        loaded[k] = simd.load(from[k], row);
+        loaded[k] = simd.load(from[k].as_ref(), at);
     }
     loaded
 }
@@ -204,7 +196,7 @@ impl<S: Lanes> VectorCost<S> for InView1 {
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
-        take(simd, &columns.rows, 0, row)
+        load(simd, slices(&columns.rows, 0), row)
     }
 
     #[inline(always)]
@@ -227,7 +219,7 @@ impl<S: Lanes> VectorCost<S> for InView2 {
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
-        take(simd, &columns.rows, 2, row)
+        load(simd, slices(&columns.rows, 2), row)
     }
 
     #[inline(always)]
@@ -276,7 +268,7 @@ impl<S: Lanes> VectorCost<S> for Sampson {
 
     #[inline(always)]
     fn rows(simd: S, columns: &Columns, row: usize) -> Self::Rows {
-        (InView1::rows(simd, columns, row), take(simd, &columns.rows, 5, row))
+        (InView1::rows(simd, columns, row), load(simd, slices(&columns.rows, 5), row))
     }
 
     #[inline(always)]

@@ -15,6 +15,7 @@ use super::label::{tube_mask, visible_pieces, wire_mask};
 use super::{XraySample, check_side, in_image};
 use crate::SynthError;
 use crate::mask::covered;
+use crate::polyline::{arc_lengths, resample};
 use crate::rng::named_rng;
 
 /// Image `index` of the set `seed` of the vessel phantom.
@@ -23,8 +24,8 @@ use crate::rng::named_rng;
 /// side, filled with a fluid that absorbs a little more than the bath; connectors, screws and the edges
 /// of the box around it. The wire runs up one limb of the arch or a branch and on within the vessel,
 /// from wall to wall, now and then over itself. Drawn as the held-out generator draws wires (a flat
-/// profile, a coil at the tip), with its exposure; no model is shared with
-/// [`draw_xray`](super::draw_xray).
+/// profile, a coil at the tip), with its exposure; nothing of it is drawn by what
+/// [`draw_xray`](super::draw_xray) draws with, whose bench phantoms are blocks and hollow tubes.
 ///
 /// # Errors
 /// [`SynthError::BadOption`] for a side outside 64 to 4096 px.
@@ -41,9 +42,9 @@ pub fn draw_xray_phantom(side_px: u32, seed: u64, index: u64) -> Result<XraySamp
     add_fittings(&mut rng, &mut depth, &vessels);
 
     let mut rng = stream("wire");
-    let width_px = rng.random_range(1.5..4.5) * side / 512.0;
+    let width_px = (rng.random_range(1.5..4.5) * side / 512.0).max(1.2);
     let path = vessels.path(&mut rng, width_px);
-    let wire = Wire::along(&mut rng, width_px.max(1.2), path);
+    let wire = Wire::along(&mut rng, width_px, path);
     let mut shadow = Array2::zeros(depth.dim());
     wire.add_to(&mut shadow, rng.random_range(0.2..1.0));
     depth += &shadow;
@@ -197,7 +198,9 @@ impl Vessels {
                 at + Vector2::new(-along.y, along.x) * aside
             })
             .collect();
-        let mut path = resampled(&smoothed(&offset, 40));
+        let smooth = smoothed(&offset, 40);
+        let length_px = arc_lengths(&smooth).last().copied().unwrap_or(0.0);
+        let mut path = resample(&smooth, (length_px / STEP_PX).round().max(1.0) as usize + 1);
         if rng.random_bool(0.5) {
             hook(rng, &mut path, width_px);
         }
@@ -215,24 +218,6 @@ fn smoothed(points: &[Point2], reach: usize) -> Vec<Point2> {
             Point2::from(sum / (2 * near + 1) as f64)
         })
         .collect()
-}
-
-/// Vertices [`STEP_PX`] apart along the same line.
-fn resampled(points: &[Point2]) -> Vec<Point2> {
-    let mut even = vec![points[0]];
-    let mut left = STEP_PX;
-    for ends in points.windows(2) {
-        let (from, step) = (ends[0], ends[1] - ends[0]);
-        let length = step.norm();
-        let mut done = 0.0;
-        while length - done >= left {
-            done += left;
-            even.push(from + step * (done / length));
-            left = STEP_PX;
-        }
-        left -= length - done;
-    }
-    even
 }
 
 /// Bends the tip back over the wire, as a J.
@@ -316,15 +301,5 @@ mod tests {
             assert!(on + 5.0 < off, "{index}: {on} on the wire, {off} beside it");
         }
         assert!(matches!(draw_xray_phantom(10, 7, 0), Err(SynthError::BadOption { .. })));
-    }
-
-    #[test]
-    fn resampling_keeps_the_line_and_evens_the_steps() {
-        let bent = [Point2::new(0.0, 0.0), Point2::new(3.2, 0.0), Point2::new(3.2, 4.1)];
-        let even = resampled(&bent);
-        assert_eq!(even.len(), (7.3 / STEP_PX) as usize + 1);
-        for p in &even {
-            assert!(p.y.abs() < 1e-9 || (p.x - 3.2).abs() < 1e-9, "{p}");
-        }
     }
 }
