@@ -175,6 +175,22 @@ impl FreeMatcher {
         self.finish(best, curve2, rig, Some(margin))
     }
 
+    /// Matches two closed curves whose direction is known: curve 2 is read backwards if `reversed`.
+    /// A ring that faces both cameras matches in both directions, each of its halves with either of
+    /// the other view: which one it is only bending can tell.
+    ///
+    /// # Errors
+    /// As [`match_directed`](Self::match_directed).
+    pub fn match_closed_directed(
+        &self,
+        curve1: &[Pixel<View1>],
+        curve2: &[Pixel<View2>],
+        reversed: bool,
+        rig: &Rig,
+    ) -> Result<FreeMatch, MatchError> {
+        self.finish(self.closed(curve1, curve2, reversed, rig)?, curve2, rig, None)
+    }
+
     fn open(
         &self,
         curve1: &[Pixel<View1>],

@@ -33,11 +33,11 @@ pub mod plan;
 mod reconstruct;
 mod reconstruction;
 mod report;
-mod ring_masks;
 mod robust;
 mod sampled_curve;
 mod segment;
 pub mod table;
+mod unrolled;
 
 pub use diagnostics::{CalibrationDiagnostics, Diagnostics, OutlineDiagnostics, PointsDiagnostics};
 pub use error::{Error, Stage};

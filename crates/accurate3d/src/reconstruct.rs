@@ -10,9 +10,8 @@ use ndarray::Array2;
 
 use crate::direction::runs_against;
 use crate::ordered_points::adjusted_points;
-use crate::ring_masks::ring_masks;
 use crate::robust::{reconstruct_masks, without_strays};
-use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled};
+use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled, sampled_ring};
 use crate::{
     Diagnostics, Error, Explanation, InputKind, Method, Reconstruction, RobustParams, Traces,
     UnknownName, ViewPair,
@@ -39,8 +38,7 @@ pub enum Closure {
     /// It has two ends.
     #[default]
     Open,
-    /// It has none. Experimental: right on exact sub-pixel points that begin at the same place;
-    /// whole pixels and masks of rings come out wrong.
+    /// It has none.
     Closed,
 }
 
@@ -128,10 +126,7 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
     }
     match (params.method, params.input) {
         (Method::Accurate, InputKind::Mask | InputKind::Image) => {
-            return match ring_masks(pair, params)? {
-                Some(ring) => Ok(ring),
-                None => joint_choice(pair, params),
-            };
+            return joint_choice(pair, params);
         }
         (Method::Accurate, InputKind::Points) => return adjusted_points(pair, params),
         _ => {}
@@ -205,7 +200,7 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
     let robust =
         RobustParams { exchange: params.robust.exchange && maps.is_none(), ..params.robust };
     let maps = maps.filter(|_| params.robust.by_probability);
-    let result = reconstruct_masks(masks, maps, &pair.rig, &robust, &pair.id)?;
+    let result = reconstruct_masks(masks, maps, &pair.rig, &robust, params.closure, &pair.id)?;
     // The curve was fitted under the corrected camera, if one was asked for.
     let rig = match &result.calibration {
         Some(calibration) => &calibration
@@ -213,11 +208,16 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
             .map_err(|source| Error::Fitting { case: pair.id.clone(), source })?,
         None => &pair.rig,
     };
+    let sampling = match params.closure {
+        Closure::Open => sampled,
+        Closure::Closed => sampled_ring,
+    };
     let SampledCurve { points, covariances } =
-        sampled(&result.fit.curve, result.fit.covariance.as_ref(), rig);
+        sampling(&result.fit.curve, result.fit.covariance.as_ref(), rig);
     let along_epipolar_line = along_epipolar_lines(&points, rig)
         .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;
-    let diagnostics = Diagnostics::of_joint(&result, strays_px, &along_epipolar_line);
+    let mut diagnostics = Diagnostics::of_joint(&result, strays_px, &along_epipolar_line);
+    diagnostics.closed = params.closure == Closure::Closed;
     let explanation = result.explanation.clone();
     Ok(Reconstruction {
         id: pair.id.clone(),

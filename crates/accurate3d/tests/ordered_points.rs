@@ -1,4 +1,4 @@
-//! `accurate` mode on ordered points: rings, a wrong calibration, turned images, threads.
+//! `accurate` mode on ordered points: a wrong calibration, turned images, threads.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 #[path = "support/turned_cameras.rs"]
@@ -6,53 +6,14 @@ mod turned_cameras;
 
 use accurate3d::eval::curve_scores;
 use accurate3d::fit::CalibrationPriors;
-use accurate3d::geom::nalgebra::{Matrix3, Rotation3, Vector3};
-use accurate3d::geom::{Camera, ImageSize, LengthUnit, Pixel, Point3, Rig, View};
+use accurate3d::geom::{Camera, Pixel, Rig, View};
 use accurate3d::io::OrderedPoints;
 use accurate3d::synth::{CalibrationError, CaseOptions, Family, SynthCase, generate};
-use accurate3d::{
-    Closure, Error, InputKind, Method, Params, Reconstruction, ViewPair, reconstruct,
-};
+use accurate3d::{Error, InputKind, Method, Params, Reconstruction, ViewPair, reconstruct};
 use ndarray::Array2;
 use turned_cameras::{mirrored, transposed};
 
 const SEED: u64 = 1907;
-const SIZE: u32 = 512;
-
-/// Two cameras 60 degrees apart, 1000 units from the origin; one unit there is 1.2 px.
-fn rig() -> Rig {
-    let camera = |degrees: f64| {
-        let k = Matrix3::new(1200.0, 0.0, 255.5, 0.0, 1200.0, 255.5, 0.0, 0.0, 1.0);
-        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), degrees.to_radians());
-        let t = Vector3::new(0.0, 0.0, 1000.0);
-        Camera::new(k, *turn.matrix(), t, ImageSize { width: SIZE, height: SIZE }).unwrap()
-    };
-    Rig::new(camera(-30.0), camera(30.0), LengthUnit::Unit).unwrap()
-}
-
-/// A bent ring that shows itself open in both views; `phase` moves its first point.
-fn ring(phase: f64, reversed: bool) -> Vec<Point3> {
-    let mut points: Vec<Point3> = (0..900)
-        .map(|k| {
-            let a = phase + f64::from(k) / 900.0 * std::f64::consts::TAU;
-            Point3::new(120.0 * a.cos(), 130.0 * a.sin(), 40.0 * (2.0 * a + 0.4).sin())
-        })
-        .collect();
-    if reversed {
-        points.reverse();
-    }
-    points
-}
-
-fn seen<V: View>(camera: &Camera, points: &[Point3], whole: bool) -> Vec<Pixel<V>> {
-    let mut seen: Vec<Pixel<V>> = points
-        .iter()
-        .map(|p| camera.project(p).unwrap())
-        .map(|p| if whole { Pixel::new(p.x.round(), p.y.round()) } else { Pixel::from(p) })
-        .collect();
-    seen.dedup();
-    seen
-}
 
 fn pair(rig: &Rig, points: Option<OrderedPoints>, masks: Option<[Array2<bool>; 2]>) -> ViewPair {
     ViewPair { points, masks, ..ViewPair::new("ordered-points", rig.clone()) }
@@ -60,44 +21,6 @@ fn pair(rig: &Rig, points: Option<OrderedPoints>, masks: Option<[Array2<bool>; 2
 
 fn accurate(pair: &ViewPair, input: InputKind) -> Result<Reconstruction, Error> {
     reconstruct(pair, &Params::new(input, Method::Accurate))
-}
-
-/// Mean and largest distance of a reconstruction from a closed truth, both ways.
-fn off_ring(found: &Reconstruction) -> (f64, f64) {
-    let mut truth = ring(0.0, false);
-    truth.push(truth[0]);
-    let scores = curve_scores(&found.positions(), &truth, 0.2).unwrap();
-    (scores.overall, scores.hausdorff)
-}
-
-#[test]
-fn a_ring_of_exact_points_is_closed() {
-    let rig = rig();
-    let one = seen(rig.camera1(), &ring(0.0, false), false);
-    let two = seen(rig.camera2(), &ring(0.0, false), false);
-    let params =
-        Params { closure: Closure::Closed, ..Params::new(InputKind::Points, Method::Accurate) };
-    let found = reconstruct(&pair(&rig, Some((one, two)), None), &params).unwrap();
-    assert!(found.diagnostics.closed);
-    assert_eq!(found.points[0].position, found.points[found.points.len() - 1].position);
-    let (mean, largest) = off_ring(&found);
-    // As open curves: exact points to hundredths.
-    assert!(mean < 0.02 && largest < 0.1, "{mean} {largest}");
-    assert!(found.covariances.is_some());
-}
-
-#[test]
-fn an_open_body_is_no_ring() {
-    let case = generate(Family::Easy, SEED, 0, &CaseOptions::default()).unwrap();
-    let pair = ViewPair::from(case);
-    let params =
-        Params { closure: Closure::Closed, ..Params::new(InputKind::Mask, Method::Accurate) };
-    match reconstruct(&pair, &params) {
-        Err(Error::NotClosed { view: 1, tips, .. }) => assert!(tips >= 1),
-        other => panic!("{other:?}"),
-    }
-    let found = accurate(&pair, InputKind::Points).unwrap();
-    assert!(!found.diagnostics.closed);
 }
 
 fn per_px(case: &SynthCase) -> f64 {

@@ -44,8 +44,8 @@ pub struct ReconstructArgs {
     /// Estimate a small shift and turn of camera 2 together with the curve (accurate mode only).
     #[arg(long)]
     pub refine_calibration: bool,
-    /// Whether the body is a ring without ends, yes or no (accurate mode only). Experimental: right
-    /// on exact points that begin at the same place only; whole pixels and masks come out wrong.
+    /// Whether the body is a ring without ends, yes or no (accurate mode only); points may begin
+    /// anywhere and run either way
     #[arg(long, default_value_t, value_name = "yes|no")]
     pub closed: Closure,
     /// Exit with code 4 if a result is suspect; it is written all the same.

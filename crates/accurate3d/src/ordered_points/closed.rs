@@ -1,186 +1,141 @@
-use accurate_fit::{FitError, PointFit, PointFitParams, fit_points};
-use accurate_geom::nalgebra::Matrix3;
-use accurate_geom::{Pixel, Point3, Rig, View, View1, View2};
-use accurate_match::{CurvePoint, FreeMatch, FreeMatcher};
+use accurate_fit::{FitError, PointFitParams};
+use accurate_geom::{Pixel, Rig, View1, View2};
+use accurate_match::{FreeMatch, MatchError, TangencyParams};
 
 use super::adjusted::Adjusted;
-use super::part::filled;
+use super::{Curves, Found, matcher, under_better_calibration, whole_pixels};
 use crate::diagnostics::Adjustment;
-use crate::{Error, Params, Reconstruction, ViewPair};
-
-/// Ordered points of a closed curve in both views; the first is not repeated at the end.
-pub(crate) struct Ring<'a> {
-    pub(crate) points1: &'a [Pixel<View1>],
-    pub(crate) points2: &'a [Pixel<View2>],
-    /// Fraction of each view's skeleton that the points pass.
-    pub(crate) coverage: [f64; 2],
-}
+use crate::sampled_curve::{SampledCurve, sampled_ring};
+use crate::unrolled::{Unrolled, without_repeat};
+use crate::{Error, Params, Reconstruction, Suspicion, ViewPair};
 
 /// Fewest points of a closed curve: with less there is no ring to speak of.
 const FEWEST: usize = 12;
 
-/// Matched around, and fitted as an open curve that goes once around and [`OVERLAP_PX`] more on both
-/// sides: what is kept, in the middle, does not feel where it was cut. The last point repeats the
-/// first.
+/// Ordered points of a closed curve in both views: matched around in both directions, cut open where the match is surest, and fitted as an open
+/// curve that goes once around and somewhat more on both sides: what is kept, in the middle, does not
+/// feel where it was cut. The likelier direction is kept. The last point repeats the first.
 ///
 /// # Errors
-/// [`Error::Matching`], also for fewer than 12 points; [`Error::Fitting`].
+/// [`Error::Matching`]; [`Error::Fitting`], also for fewer than 12 points.
 pub(crate) fn closed_points(
     pair: &ViewPair,
     params: &Params,
-    ring: &Ring<'_>,
+    given: (&[Pixel<View1>], &[Pixel<View2>]),
 ) -> Result<Reconstruction, Error> {
     let case = || pair.id.clone();
-    let matching = |source| Error::Matching { case: case(), source };
-    let points1 = without_repeat(ring.points1);
-    let points2 = without_repeat(ring.points2);
+    let points1 = without_repeat(given.0);
+    let points2 = without_repeat(given.1);
     let found = points1.len().min(points2.len());
     if found < FEWEST {
         let source =
             FitError::TooFewPoints { what: "points of a closed curve", found, needed: FEWEST };
         return Err(Error::Fitting { case: case(), source });
     }
-    let matched =
-        FreeMatcher::default().match_closed(points1, points2, &pair.rig).map_err(matching)?;
-    let fit = fit_around(points1, points2, &matched, &pair.rig, params);
-    let adjustment = Adjustment::of(&fit.as_ref().map(|around| &around.fit).map_err(Clone::clone));
-    let (points, covariances, rig) = match fit {
-        Ok(around) => {
-            let corrected = around.fit.calibration.map(|c| c.correct(&pair.rig)).transpose();
-            let rig = corrected
-                .map_err(|source| Error::Fitting { case: case(), source })?
-                .unwrap_or_else(|| pair.rig.clone());
-            let (points, covariances) = around.sampled(&rig);
-            (points, Some(covariances), rig)
+    let fit_params =
+        PointFitParams { calibration: params.robust.calibration, ..PointFitParams::DEFAULT };
+    let whole = whole_pixels(points1) && whole_pixels(points2);
+    let found_under = |rig: &Rig| {
+        Directions { points1, points2, whole, rig, given_rig: &pair.rig, fit_params }.likelier()
+    };
+    let (direction, rig) =
+        under_better_calibration(&pair.rig, found_under, |d: &Direction| d.found.fit.as_ref().ok())
+            .map_err(|source| Error::Matching { case: case(), source })?;
+    let Direction { matched, found, lead, .. } = &direction;
+    let adjustment = Adjustment::of(&found.fit.as_ref().map_err(Clone::clone));
+    let (points, covariances) = match &found.fit {
+        Ok(fit) => {
+            let SampledCurve { points, covariances } =
+                sampled_ring(&fit.curve, Some(&fit.covariance), &rig);
+            (points, covariances)
         }
         Err(FitError::BadMatch { .. }) => {
             let mut points = matched.points.clone();
             points.extend(points.first().copied());
-            (points, None, pair.rig.clone())
+            (points, None)
         }
-        Err(source) => return Err(Error::Fitting { case: case(), source }),
+        Err(source) => return Err(Error::Fitting { case: case(), source: source.clone() }),
     };
-    let adjusted = Adjusted { points, covariances, rig: &rig, matched: &matched, adjustment };
-    let mut found = adjusted.into_reconstruction(pair, params, (points1, points2))?;
-    found.diagnostics.closed = true;
-    found.diagnostics.trace_coverage = ring.coverage;
-    Ok(found)
+    let adjusted = Adjusted { points, covariances, rig: &rig, matched, adjustment };
+    let mut result = adjusted.into_reconstruction(pair, params, (points1, points2))?;
+    result.diagnostics.closed = true;
+    result.diagnostics.suspicions.extend((*lead < CLEAR_LEAD).then_some(Suspicion::Ambiguous));
+    Ok(result)
 }
 
-fn without_repeat<V: View>(points: &[Pixel<V>]) -> &[Pixel<V>] {
-    match points {
-        [first, rest @ .., last] if !rest.is_empty() && first == last => {
-            &points[..points.len() - 1]
+/// Two closed curves and what they are matched and fitted by.
+struct Directions<'a> {
+    points1: &'a [Pixel<View1>],
+    points2: &'a [Pixel<View2>],
+    whole: bool,
+    rig: &'a Rig,
+    given_rig: &'a Rig,
+    fit_params: PointFitParams,
+}
+
+/// What one direction of curve 2 came to.
+struct Direction {
+    /// Around both curves.
+    matched: FreeMatch,
+    /// Of the unrolled curves.
+    found: Found,
+    /// How unlikely it is, beside the other direction, -2 ln of a probability.
+    surprise: f64,
+    /// How much less likely the other one is.
+    lead: f64,
+}
+
+/// A lead below which either direction may be the right one, -2 ln of a probability.
+const CLEAR_LEAD: f64 = 36.0;
+
+/// Two directions are compared as if the points were no better than this, px: of points without noise
+/// only what a spline cannot follow is left, and tells nothing.
+const LEAST_NOISE_PX: f64 = 0.05;
+
+impl Directions<'_> {
+    /// The direction whose fit is the likelier; of two equal ones, curve 2 as it was given.
+    fn likelier(&self) -> Result<Direction, MatchError> {
+        let Self { points1, points2, rig, .. } = *self;
+        let matcher = matcher(self.tangency());
+        let unrolled = Unrolled::in_both_directions(points1, points2, 1, &matcher, rig)?;
+        let mut found = Vec::with_capacity(unrolled.len());
+        for direction in &unrolled {
+            let around = (&direction.points1[..], &direction.points2[..]);
+            found.push(self.fitted(around, true, self.fit_params)?);
         }
-        _ => points,
-    }
-}
-
-/// How far the fit goes on beyond once around, on each side, px: several times the reach of a knot,
-/// which is about 20 px.
-const OVERLAP_PX: f64 = 80.0;
-/// Over so much of a turn the end is blended into the begin.
-const BLENDED: f64 = 0.05;
-
-/// An open fit that goes around more than once.
-struct Around {
-    fit: PointFit,
-    /// Parameters between which it goes around once.
-    once: [f64; 2],
-    length_px: f64,
-}
-
-fn fit_around(
-    points1: &[Pixel<View1>],
-    points2: &[Pixel<View2>],
-    matched: &FreeMatch,
-    rig: &Rig,
-    params: &Params,
-) -> Result<Around, FitError> {
-    let (n1, n2) = (points1.len(), points2.len());
-    let mut directed2 = points2.to_vec();
-    if matched.reversed {
-        directed2.reverse();
-    }
-    let along = |j: usize| if matched.reversed { n2 - 1 - j } else { j };
-    // Around once, with indices that go on growing where the curves start anew.
-    let mut once: Vec<(usize, usize)> = Vec::with_capacity(matched.pairs.len());
-    let (mut turns1, mut turns2) = (0, 0);
-    for &(i, j) in &matched.pairs {
-        let (mut i, mut j) = (i + turns1 * n1, along(j) + turns2 * n2);
-        if let Some(&(i0, j0)) = once.last() {
-            // A step back of more than half a turn is a step over the seam.
-            if i + n1 / 2 < i0 {
-                (i, turns1) = (i + n1, turns1 + 1);
+        let noises = found.iter().filter_map(|found| Some(found.fit.as_ref().ok()?.noise_px));
+        let noise_px = Some(noises.fold(LEAST_NOISE_PX, f64::max));
+        let mut best: Option<Direction> = None;
+        for (direction, found) in unrolled.into_iter().zip(found) {
+            let alike = PointFitParams { noise_px, ..self.fit_params };
+            // Begin and end are one point, in the right direction of both views at once.
+            let fitted = self.fitted(direction.once(), false, alike)?;
+            let surprise = fitted.surprise_of_direction();
+            let behind = best.as_ref().map_or(f64::INFINITY, |best| best.surprise - surprise);
+            match &mut best {
+                Some(best) if behind <= 0.0 => best.lead = -behind,
+                _ => {
+                    let matched = direction.matched;
+                    best = Some(Direction { matched, found, surprise, lead: behind });
+                }
             }
-            if j + n2 / 2 < j0 {
-                (j, turns2) = (j + n2, turns2 + 1);
-            }
-            (i, j) = (i.max(i0), j.max(j0));
         }
-        once.push((i, j));
+        best.ok_or(MatchError::NoFinitePath { n1: points1.len(), n2: points2.len() })
     }
-    let needed = 4;
-    let Some(&first) = once.first() else {
-        return Err(FitError::TooFewPoints { what: "matched pairs", found: 0, needed });
-    };
-    // The last pairs may be the first again.
-    once.retain(|&(i, j)| i < first.0 + n1 && j < first.1 + n2 || (i, j) == first);
-    let around = |turn: usize| once.iter().map(move |&(i, j)| (i + turn * n1, j + turn * n2));
-    let thrice: Vec<_> = (0..3).flat_map(around).collect();
-    let length_px = ring_length(points1).max(ring_length(points2));
-    let extra = ((OVERLAP_PX / length_px).min(0.45) * n1 as f64).ceil() as usize;
-    let (from, to) = (first.0 + n1 - extra, first.0 + 2 * n1 + extra);
-    let kept: Vec<_> = thrice.into_iter().filter(|p| (from..=to).contains(&p.0)).collect();
-    let (Some(&(i0, j0)), Some(&(i1, j1))) = (kept.first(), kept.last()) else {
-        return Err(FitError::TooFewPoints { what: "matched pairs", found: 0, needed });
-    };
-    let curve1: Vec<_> = (i0..=i1).map(|i| points1[i % n1]).collect();
-    let curve2: Vec<_> = (j0..=j1).map(|j| directed2[j % n2]).collect();
-    let pairs: Vec<_> = kept.iter().map(|&(i, j)| (i - i0, j - j0)).collect();
-    let pairs = filled(&pairs, &[Vec::new(), Vec::new()]);
-    let fit_params = PointFitParams {
-        free_ends: [[true; 2]; 2],
-        calibration: params.robust.calibration,
-        ..PointFitParams::DEFAULT
-    };
-    let fit = fit_points(&curve1, &curve2, &pairs, rig, &fit_params)?;
-    let seam = first.0 + n1 - i0;
-    let once = [fit.parameters[0][seam], fit.parameters[0][seam + n1]];
-    Ok(Around { fit, once, length_px })
-}
 
-fn ring_length<V: View>(points: &[Pixel<V>]) -> f64 {
-    (0..points.len()).map(|k| points[k].distance(points[(k + 1) % points.len()])).sum()
-}
+    fn fitted(
+        &self,
+        (points1, points2): (&[Pixel<View1>], &[Pixel<View2>]),
+        cut: bool,
+        fit_params: PointFitParams,
+    ) -> Result<Found, MatchError> {
+        let Self { whole, rig, given_rig, .. } = *self;
+        let matched = matcher(self.tangency()).match_directed(points1, points2, false, rig)?;
+        let curves = Curves { points1, points2, whole, cut, rig, given_rig, fit_params };
+        Ok(curves.fitted(matched))
+    }
 
-impl Around {
-    /// Points half a pixel apart with their covariances; the last repeats the first.
-    fn sampled(&self, rig: &Rig) -> (Vec<CurvePoint>, Vec<Matrix3<f64>>) {
-        let [from, to] = self.once;
-        let curve = &self.fit.curve;
-        let count = (2.0 * self.length_px).ceil().clamp(12.0, 65_536.0) as usize;
-        let period = to - from;
-        let (mut points, mut covariances) = (Vec::new(), Vec::new());
-        for k in 0..=count {
-            let share = k as f64 / count as f64;
-            let t = from + share * period;
-            // What goes on beyond the begin, to the left, is the same stretch of the body.
-            let s = ((share - (1.0 - BLENDED)) / BLENDED).max(0.0);
-            let weight = s * s * (3.0 - 2.0 * s);
-            let position: Point3 = curve.at(t) + (curve.at(t - period) - curve.at(t)) * weight;
-            let place = if weight > 0.5 { t - period } else { t };
-            // A fit in front of both cameras was promised; a point that is not has no picture.
-            let Ok((pixel1, pixel2)) = rig.project(&position) else { continue };
-            points.push(CurvePoint { position, pixel1, pixel2, epipolar_distance_px: 0.0 });
-            covariances.push(self.fit.covariance.at(place));
-        }
-        // The blend ends on the first point up to rounding; a closed curve ends on it exactly.
-        if let Some(first) = points.first().cloned()
-            && let Some(last) = points.last_mut()
-        {
-            *last = first;
-        }
-        (points, covariances)
+    fn tangency(&self) -> TangencyParams {
+        if self.whole { TangencyParams::WHOLE_PIXELS } else { TangencyParams::DEFAULT }
     }
 }

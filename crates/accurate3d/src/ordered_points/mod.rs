@@ -8,7 +8,7 @@ use accurate_geom::{Pixel, Rig, View, View1, View2};
 use accurate_match::{FreeMatch, FreeMatchParams, FreeMatcher, MatchError, TangencyParams};
 
 use adjusted::Adjusted;
-pub(crate) use closed::{Ring, closed_points};
+use closed::closed_points;
 use part::{DOUBTFUL_POINTS, End, MatchedPart};
 use starts::smoothed_pairs;
 
@@ -29,29 +29,18 @@ pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Recons
         .as_ref()
         .ok_or_else(|| Error::MissingInput { case: case(), input: params.input })?;
     if params.closure == Closure::Closed {
-        let ring = Ring { points1, points2, coverage: [1.0; 2] };
-        return closed_points(pair, params, &ring);
+        return closed_points(pair, params, (points1, points2));
     }
     let fit_params =
         PointFitParams { calibration: params.robust.calibration, ..PointFitParams::DEFAULT };
     let whole = whole_pixels(points1) && whole_pixels(points2);
-    let matched_and_fitted = |rig| {
-        Curves { points1, points2, whole, rig, given_rig: &pair.rig, fit_params }
+    let matched_and_fitted = |rig: &Rig| {
+        Curves { points1, points2, whole, cut: false, rig, given_rig: &pair.rig, fit_params }
             .found()
             .map_err(|source| Error::Matching { case: case(), source })
     };
-    let mut found = matched_and_fitted(&pair.rig)?;
-    let calibrated = |fit: &PointFit| fit.calibration.and_then(|c| c.correct(&pair.rig).ok());
-    let mut rig = pair.rig.clone();
-    if let Ok(first) = &found.fit
-        && let Some(corrected) = calibrated(first)
-    {
-        // Matched once more under the better calibration; what is estimated stays relative to the
-        // given one.
-        found = matched_and_fitted(&corrected)?;
-        rig = found.fit.as_ref().ok().and_then(calibrated).unwrap_or(rig);
-    }
-    let Found { matched, fit, .. } = found;
+    let (Found { matched, fit, .. }, rig) =
+        under_better_calibration(&pair.rig, matched_and_fitted, |found| found.fit.as_ref().ok())?;
     let adjustment = Adjustment::of(&fit);
     let (points, covariances) = match fit {
         Ok(fit) => {
@@ -69,6 +58,26 @@ pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Recons
         params,
         (points1, points2),
     )
+}
+
+/// What was found under the given calibration and the rig that it holds under: if the fit estimates
+/// another calibration, it is found once more under that. What is estimated stays relative to the
+/// given one.
+fn under_better_calibration<T, E>(
+    given: &Rig,
+    found_under: impl Fn(&Rig) -> Result<T, E>,
+    fit: impl Fn(&T) -> Option<&PointFit>,
+) -> Result<(T, Rig), E> {
+    let corrected = |found: &T| fit(found)?.calibration?.correct(given).ok();
+    let found = found_under(given)?;
+    match corrected(&found) {
+        Some(better) => {
+            let found = found_under(&better)?;
+            let rig = corrected(&found).unwrap_or_else(|| given.clone());
+            Ok((found, rig))
+        }
+        None => Ok((found, given.clone())),
+    }
 }
 
 /// A match and the likeliest fit that starts from it.
@@ -107,6 +116,8 @@ struct Curves<'a> {
     points2: &'a [Pixel<View2>],
     /// Whether they are whole pixels.
     whole: bool,
+    /// Whether the body goes on beyond both ends.
+    cut: bool,
     /// Under which they are matched.
     rig: &'a Rig,
     /// Under which they are fitted.
@@ -162,7 +173,7 @@ impl Curves<'_> {
             }
             let hidden = part.hidden();
             let fit_params = PointFitParams {
-                free_ends: part.free_ends(tips),
+                free_ends: if self.cut { [[true; 2]; 2] } else { part.free_ends(tips) },
                 // What the other view does not see needs no partner; more than a third is no match.
                 min_coverage: fit_params.min_coverage - if hidden < 0.34 { hidden } else { 0.0 },
                 ..*fit_params

@@ -5,8 +5,8 @@ use accurate_seg::{
     GapHint, GapParams, Mask, distance_to_background, gap_hints, median_width_px, zhang_suen,
 };
 use accurate_traverse::{
-    GraphEdge, GraphParams, HalfEdge, PointFlags, SkeletonGraph, Walk, WalkEnd, WalkParams,
-    fill_small_holes, k_best_walks_with_reward,
+    GraphEdge, GraphParams, HalfEdge, NodeKind, PointFlags, SkeletonGraph, Walk, WalkEnd,
+    WalkParams, fill_small_holes, k_best_walks_with_reward,
 };
 use ndarray::{Array2, Axis, Slice};
 
@@ -94,6 +94,11 @@ impl<V: View> ViewCandidates<V> {
         let mut view = Self { outline, walks: Vec::new(), bridges, graph, origin, hinted_ends };
         view.walk(params, &[], case)?;
         Ok(view)
+    }
+
+    /// Tips of the skeleton.
+    pub(crate) fn tips(&self) -> usize {
+        self.graph.nodes().iter().filter(|node| node.kind == NodeKind::Tip).count()
     }
 
     /// Adds the walks that want to pass twice near the `rewards` (positions and weights); those

@@ -9,7 +9,7 @@ use super::evidence::{Evidence, Walks};
 use super::score::Candidate;
 use super::search::{Effort, Search, Tried};
 use super::suspicion::{Suspicion, calls_for_a_second_look, suspicions};
-use crate::{Error, Explanation};
+use crate::{Closure, Error, Explanation};
 
 /// How hard the joint choice looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,6 +121,7 @@ pub(crate) fn reconstruct_masks(
     probabilities: Option<&[Array2<f32>; 2]>,
     rig: &Rig,
     params: &RobustParams,
+    closure: Closure,
     case: &str,
 ) -> Result<JointResult, Error> {
     let map = |view: usize| probabilities.map(|both| &both[view]);
@@ -131,7 +132,10 @@ pub(crate) fn reconstruct_masks(
         .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));
     let mut search = Search { outlines: &outlines, rig, params, case, effort: Effort::Quick };
     let mut settle = |search: &Search<'_>, earlier| -> Result<Settled, Error> {
-        let choice = choose(search, &mut view1, &mut view2, earlier)?;
+        let choice = match closure {
+            Closure::Open => choose(search, &mut view1, &mut view2, earlier)?,
+            Closure::Closed => choose_ring(search, &view1, &view2)?,
+        };
         Ok(Settled::of(search, choice, rig, &view1, &view2))
     };
     let mut result = settle(&search, None)?;
@@ -141,6 +145,8 @@ pub(crate) fn reconstruct_masks(
         result = settle(&search, None)?;
     }
     let again = match params.second_look {
+        // Every pair of closed walks has been fitted from everywhere.
+        _ if closure == Closure::Closed => false,
         SecondLook::Never => false,
         SecondLook::InDoubt => calls_for_a_second_look(&result.evidence),
         SecondLook::Always => true,
@@ -281,6 +287,23 @@ fn choose(
         return Err(Error::NoCandidate { case: search.case.to_owned(), walks, pairs });
     }
     Ok(Choice { finalists, fits, tried })
+}
+
+/// The rings that pairs of closed walks give.
+fn choose_ring(
+    search: &Search<'_>,
+    view1: &ViewCandidates<View1>,
+    view2: &ViewCandidates<View2>,
+) -> Result<Choice, Error> {
+    let mut found = Vec::new();
+    let pairs = search.fit_rings(view1, view2, &mut found)?;
+    let fits = found.len();
+    let finalists = search.finalists(found);
+    if finalists.is_empty() {
+        let walks = [view1.walks.len(), view2.walks.len()];
+        return Err(Error::NoCandidate { case: search.case.to_owned(), walks, pairs });
+    }
+    Ok(Choice { finalists, fits, tried: Vec::new() })
 }
 
 /// The bridges twice as wide as they come: what hides the body hides how it bends there.

@@ -8,6 +8,7 @@ mod joint;
 mod other_ways;
 mod repair;
 mod reroute;
+mod ring;
 mod score;
 mod search;
 mod shape;
