@@ -10,6 +10,7 @@ use accurate_traverse::{
 };
 use ndarray::{Array2, Axis, Slice};
 
+use super::frame::{Frame, Turn};
 use crate::explanation::Alternative;
 use crate::{Error, JunctionDecision};
 
@@ -22,10 +23,9 @@ pub(crate) struct ViewCandidates<V: View> {
     pub(crate) walks: Vec<Walk<V>>,
     /// Bridges over what was not seen, as straight stretches.
     pub(crate) bridges: Vec<(Pixel<V>, Pixel<V>)>,
-    /// In the frame of the cut image.
+    /// In the frame of the cut and turned image.
     graph: SkeletonGraph<V>,
-    /// Where the cut image begins, px.
-    origin: [f64; 2],
+    frame: Frame,
     /// Both ends of every gap that the probability map leads over.
     hinted_ends: Vec<[f64; 2]>,
 }
@@ -38,6 +38,7 @@ impl<V: View> ViewCandidates<V> {
         array: &Array2<bool>,
         probability: Option<&Array2<f32>>,
         params: &WalkParams,
+        turn: Turn,
         case: &str,
     ) -> Result<Self, Error> {
         let segmentation =
@@ -57,33 +58,35 @@ impl<V: View> ViewCandidates<V> {
             None => Vec::new(),
         };
         let (mut cut, origin) = cut_to_body(array);
-        let mut mask = Mask::from_array(cut.clone()).map_err(segmentation)?;
+        let frame = Frame::new(turn, origin, &cut);
+        let mut mask = Mask::from_array(turn.array(&cut)).map_err(segmentation)?;
         if !hints.is_empty() {
             // The graph alone walks over hints; the fit judges by what the map shows.
             let half_px = 0.5 * median_width_px(&mask).map_err(segmentation)?;
             hints.iter().for_each(|hint| draw(&mut cut, hint, origin, half_px));
-            mask = Mask::from_array(cut.clone()).map_err(segmentation)?;
+            mask = Mask::from_array(turn.array(&cut)).map_err(segmentation)?;
         }
         let mut thin = zhang_suen(&mask);
         let mut radii = distance_to_background(&mask).map_err(segmentation)?;
         let thickness = median_width(&thin, &radii);
         // The holes of near-tangent overlaps would make dozens of nodes; only the graph loses them,
         // the fit sees the mask as it is.
-        let filled = fill_small_holes(&cut, GraphParams::hole_area_px(thickness));
-        if filled != cut {
+        let filled = fill_small_holes(mask.as_array(), GraphParams::hole_area_px(thickness));
+        if filled != *mask.as_array() {
             let filled = Mask::from_array(filled).map_err(segmentation)?;
             thin = zhang_suen(&filled);
             radii = distance_to_background(&filled).map_err(segmentation)?;
         }
         let graph = SkeletonGraph::new(thin.as_array(), &radii, thickness, &GraphParams::DEFAULT)
             .map_err(traversal)?;
-        let shifted = |p: &Pixel<V>| Pixel::new(p.x + origin[0], p.y + origin[1]);
         let mut bridges: Vec<_> = graph
             .edges()
             .iter()
             .filter(|edge| edge.link)
-            .flat_map(|edge| edge.points.windows(2).map(|w| (w[0], w[1])).chain(turn(&graph, edge)))
-            .map(|(a, b)| (shifted(&a), shifted(&b)))
+            .flat_map(|edge| {
+                edge.points.windows(2).map(|w| (w[0], w[1])).chain(hidden_turn(&graph, edge))
+            })
+            .map(|(a, b)| (frame.in_image(a), frame.in_image(b)))
             .collect();
         let mut hinted_ends = Vec::new();
         for hint in &hints {
@@ -91,7 +94,7 @@ impl<V: View> ViewCandidates<V> {
             hinted_ends.extend(line.first().iter().chain(&line.last()).map(|p| [p.x, p.y]));
             bridges.extend(line.windows(2).map(|w| (w[0], w[1])));
         }
-        let mut view = Self { outline, walks: Vec::new(), bridges, graph, origin, hinted_ends };
+        let mut view = Self { outline, walks: Vec::new(), bridges, graph, frame, hinted_ends };
         view.walk(params, &[], case)?;
         Ok(view)
     }
@@ -109,9 +112,8 @@ impl<V: View> ViewCandidates<V> {
         rewards: &[([f64; 2], f64)],
         case: &str,
     ) -> Result<(), Error> {
-        let [x0, y0] = self.origin;
         let rewards: Vec<_> =
-            rewards.iter().map(|&([x, y], w)| (Pixel::new(x - x0, y - y0), w)).collect();
+            rewards.iter().map(|&([x, y], w)| (self.frame.in_part(Pixel::new(x, y)), w)).collect();
         let mut walks = k_best_walks_with_reward(&self.graph, params, &rewards)
             .map_err(|source| Error::Traversal { case: case.to_owned(), source })?;
         walks.retain(|walk| self.walks.iter().all(|known| known.halves != walk.halves));
@@ -119,7 +121,7 @@ impl<V: View> ViewCandidates<V> {
             // What a walk is worth without the reward.
             walk.cost.missed_reward = 0.0;
             for point in &mut walk.points {
-                *point = Pixel::new(point.x + x0, point.y + y0);
+                *point = self.frame.in_image(*point);
             }
         }
         self.walks.append(&mut walks);
@@ -136,21 +138,22 @@ impl<V: View> ViewCandidates<V> {
             .filter(|edge| edge.link)
             .flat_map(|edge| [edge.points.first(), edge.points.last()])
             .flatten()
-            .map(|p| [p.x + self.origin[0], p.y + self.origin[1]])
+            .map(|p| self.frame.in_image(*p))
+            .map(|p| [p.x, p.y])
             .chain(self.hinted_ends.iter().copied())
             .collect()
     }
 
     /// What a walk did where it could have gone on otherwise.
     pub(crate) fn junctions(&self, walk: usize) -> Vec<JunctionDecision> {
-        let [x0, y0] = self.origin;
         let way = |half: &HalfEdge| self.way(half);
         self.walks[walk]
             .decisions
             .iter()
             .filter(|decision| !decision.alternatives.is_empty())
-            .map(|decision| JunctionDecision {
-                at: [decision.at.x + x0, decision.at.y + y0],
+            .map(|decision| (self.frame.in_image(decision.at), decision))
+            .map(|(at, decision)| JunctionDecision {
+                at: [at.x, at.y],
                 taken: way(&decision.left_along),
                 price: decision.price,
                 // Where turning round is not allowed at all, it is no alternative.
@@ -170,8 +173,8 @@ impl<V: View> ViewCandidates<V> {
         let points = &self.graph.edges()[half.edge].points;
         let last = points.len().saturating_sub(1);
         let at = if half.reversed { last.saturating_sub(AHEAD) } else { AHEAD.min(last) };
-        match points.get(at) {
-            Some(p) => format!("to {:.0}, {:.0}", p.x + self.origin[0], p.y + self.origin[1]),
+        match points.get(at).map(|p| self.frame.in_image(*p)) {
+            Some(p) => format!("to {:.0}, {:.0}", p.x, p.y),
             None => format!("along edge {}", half.edge),
         }
     }
@@ -191,7 +194,10 @@ impl<V: View> ViewCandidates<V> {
 
 /// Where the body may turn out of sight: straight on from both ends of a link whose strands run side
 /// by side, and across. A hairpin's turn hidden by something lies farther off than the link.
-fn turn<V: View>(graph: &SkeletonGraph<V>, link: &GraphEdge<V>) -> Vec<(Pixel<V>, Pixel<V>)> {
+fn hidden_turn<V: View>(
+    graph: &SkeletonGraph<V>,
+    link: &GraphEdge<V>,
+) -> Vec<(Pixel<V>, Pixel<V>)> {
     /// No farther ahead, px: what hides the body hides no more of it.
     const AHEAD_PX: f64 = 14.0;
     /// Over so many points the direction of an end is taken.

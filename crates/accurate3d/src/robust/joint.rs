@@ -6,10 +6,11 @@ use ndarray::Array2;
 
 use super::candidates::ViewCandidates;
 use super::evidence::{Evidence, Walks};
+use super::frame::Turn;
 use super::score::Candidate;
 use super::search::{Effort, Search, Tried};
 use super::suspicion::{Suspicion, calls_for_a_second_look, suspicions};
-use crate::{Closure, Error, Explanation};
+use crate::{Closure, ConsideredCurve, Error, Explanation};
 
 /// How hard the joint choice looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,10 +113,12 @@ pub(crate) struct JointResult {
 /// Curves nowhere farther apart than this do not compete, px.
 const RIVAL_PX: f64 = 5.0;
 
-/// Proposes, pairs, fits, judges; by the probability maps behind the masks, where they are given.
+/// Proposes, pairs, fits, judges; by the probability maps behind the masks, where they are given. In
+/// doubt once more with the images turned, and again, until nothing speaks against the likeliest curve.
 ///
 /// # Errors
-/// [`Error`] of a view that shows no curve; [`Error::NoCandidate`] if no pair of walks gives one.
+/// [`Error`] of a view that shows no curve; [`Error::NoCandidate`] if no pair of walks gives one;
+/// [`Error::NotClosed`] if a ring was asked for and a view shows none.
 pub(crate) fn reconstruct_masks(
     masks: &[Array2<bool>; 2],
     probabilities: Option<&[Array2<f32>; 2]>,
@@ -124,57 +127,131 @@ pub(crate) fn reconstruct_masks(
     closure: Closure,
     case: &str,
 ) -> Result<JointResult, Error> {
-    let map = |view: usize| probabilities.map(|both| &both[view]);
-    let mut view1 = ViewCandidates::<View1>::of(&masks[0], map(0), &params.walks, case)?;
-    let mut view2 = ViewCandidates::<View2>::of(&masks[1], map(1), &params.walks, case)?;
-    let (outline1, outline2) = (view1.outline.clone(), view2.outline.clone());
-    let outlines = OutlinePair::new(&outline1, &outline2)
-        .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));
-    let mut search = Search { outlines: &outlines, rig, params, case, effort: Effort::Quick };
-    let mut settle = |search: &Search<'_>, earlier| -> Result<Settled, Error> {
-        let choice = match closure {
-            Closure::Open => choose(search, &mut view1, &mut view2, earlier)?,
-            Closure::Closed => choose_ring(search, &view1, &view2)?,
+    let look = |turn| Look { masks, probabilities, rig, params, closure, turn, case }.look();
+    let mut seen = look(Turn::Upright)?;
+    for turn in Turn::OTHERS {
+        let again = match params.second_look {
+            // Every pair of closed walks has been fitted from everywhere.
+            _ if closure == Closure::Closed => false,
+            SecondLook::Never => false,
+            SecondLook::InDoubt => !suspicions(&seen.settled.evidence).is_empty(),
+            SecondLook::Always => true,
         };
-        Ok(Settled::of(search, choice, rig, &view1, &view2))
-    };
-    let mut result = settle(&search, None)?;
-    let corrected = result.calibration.as_ref().and_then(|found| found.correct(rig).ok());
-    if let Some(corrected) = &corrected {
-        search.rig = corrected;
-        result = settle(&search, None)?;
+        if !again {
+            break;
+        }
+        // What shows no curve when turned takes nothing from what was seen.
+        if let Ok(other) = look(turn) {
+            seen = seen.beside(other);
+        }
     }
-    let again = match params.second_look {
-        // Every pair of closed walks has been fitted from everywhere.
-        _ if closure == Closure::Closed => false,
-        SecondLook::Never => false,
-        SecondLook::InDoubt => calls_for_a_second_look(&result.evidence),
-        SecondLook::Always => true,
-    };
-    if again {
-        search.effort = Effort::Thorough;
-        result = settle(&search, Some(result.choice))?;
+    Ok(seen.into_result())
+}
+
+/// What a look at the images takes.
+struct Look<'a> {
+    masks: &'a [Array2<bool>; 2],
+    probabilities: Option<&'a [Array2<f32>; 2]>,
+    rig: &'a Rig,
+    params: &'a RobustParams,
+    closure: Closure,
+    turn: Turn,
+    case: &'a str,
+}
+
+/// What a look at the images came to.
+struct Seen {
+    view1: ViewCandidates<View1>,
+    view2: ViewCandidates<View2>,
+    settled: Settled,
+    /// Other curves that other looks found.
+    passed_over: Vec<ConsideredCurve>,
+    /// Pairs of walks that were fitted, by all looks.
+    fits: usize,
+}
+
+impl Look<'_> {
+    /// Quickly, and thoroughly if in doubt.
+    fn look(&self) -> Result<Seen, Error> {
+        let Self { masks, probabilities, rig, params, closure, turn, case } = *self;
+        let map = |view: usize| probabilities.map(|both| &both[view]);
+        let walks = &params.walks;
+        let mut view1 = ViewCandidates::<View1>::of(&masks[0], map(0), walks, turn, case)?;
+        let mut view2 = ViewCandidates::<View2>::of(&masks[1], map(1), walks, turn, case)?;
+        let (outline1, outline2) = (view1.outline.clone(), view2.outline.clone());
+        let outlines = OutlinePair::new(&outline1, &outline2)
+            .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));
+        let mut search = Search { outlines: &outlines, rig, params, case, effort: Effort::Quick };
+        let mut settle = |search: &Search<'_>, earlier| -> Result<Settled, Error> {
+            let choice = match closure {
+                Closure::Open => choose(search, &mut view1, &mut view2, earlier)?,
+                Closure::Closed => choose_ring(search, &view1, &view2)?,
+            };
+            Ok(Settled::of(search, choice, rig, &view1, &view2))
+        };
+        let mut settled = settle(&search, None)?;
+        let corrected = settled.calibration.as_ref().and_then(|found| found.correct(rig).ok());
+        if let Some(corrected) = &corrected {
+            search.rig = corrected;
+            settled = settle(&search, None)?;
+        }
+        let again = match params.second_look {
+            _ if closure == Closure::Closed => false,
+            SecondLook::Never => false,
+            SecondLook::InDoubt => calls_for_a_second_look(&settled.evidence),
+            SecondLook::Always => true,
+        };
+        if again {
+            search.effort = Effort::Thorough;
+            settled = settle(&search, Some(settled.choice))?;
+        }
+        let fits = settled.choice.fits;
+        Ok(Seen { view1, view2, settled, passed_over: Vec::new(), fits })
     }
-    let Settled { choice, mut fits, calibration, evidence } = result;
-    let rivals = &choice.finalists[fits.len()..];
-    let candidates = fits.iter().chain(rivals).map(Candidate::considered).collect();
-    let best = fits.swap_remove(0);
-    let [i, j] = best.walks;
-    let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
-    let explanation =
-        Explanation { candidates, junctions: [view1.junctions(i), view2.junctions(j)] };
-    Ok(JointResult {
-        explanation,
-        walk1: view1.walks[i].points.clone(),
-        walk2: directed(&view2.walks[j].points, best.reversed),
-        coverage,
-        mean_distance_px: best.mean_distance_px,
-        fits: choice.fits,
-        calibration,
-        suspicions: suspicions(&evidence),
-        evidence,
-        fit: best.fit,
-    })
+}
+
+impl Seen {
+    /// The likelier of two looks at the same images, with what the other one knows against it.
+    fn beside(self, other: Self) -> Self {
+        let unlikeliness = |seen: &Self| seen.settled.fits[0].unlikeliness();
+        let (mut seen, passed) =
+            if unlikeliness(&other) < unlikeliness(&self) { (other, self) } else { (self, other) };
+        let best = &seen.settled.fits[0];
+        let rivals =
+            passed.settled.fits.iter().filter(|fit| !fit.shape.is_like(&best.shape, RIVAL_PX));
+        let behind = rivals.clone().map(|rival| rival.unlikeliness() - best.unlikeliness());
+        let margin = &mut seen.settled.evidence.margin;
+        *margin = behind.chain(*margin).min_by(f64::total_cmp);
+        seen.passed_over.extend(rivals.map(Candidate::considered));
+        seen.passed_over.extend(passed.passed_over);
+        seen.fits += passed.fits;
+        seen
+    }
+
+    fn into_result(self) -> JointResult {
+        let Self { view1, view2, settled, passed_over, fits: tried } = self;
+        let Settled { choice, mut fits, calibration, evidence } = settled;
+        let rivals = &choice.finalists[fits.len()..];
+        let candidates =
+            fits.iter().chain(rivals).map(Candidate::considered).chain(passed_over).collect();
+        let best = fits.swap_remove(0);
+        let [i, j] = best.walks;
+        let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
+        let explanation =
+            Explanation { candidates, junctions: [view1.junctions(i), view2.junctions(j)] };
+        JointResult {
+            explanation,
+            walk1: view1.walks[i].points.clone(),
+            walk2: directed(&view2.walks[j].points, best.reversed),
+            coverage,
+            mean_distance_px: best.mean_distance_px,
+            fits: tried,
+            calibration,
+            suspicions: suspicions(&evidence),
+            evidence,
+            fit: best.fit,
+        }
+    }
 }
 
 /// A choice with the last, adaptive fits.

@@ -4,6 +4,7 @@
 mod candidates;
 mod evidence;
 mod exchange;
+mod frame;
 mod joint;
 mod other_ways;
 mod repair;
