@@ -60,6 +60,7 @@ fn variants() -> Vec<(&'static str, Params)> {
         ("likelihood: the best score is taken", with(|r| r.contenders = 0.0)),
         ("exchanged stretches and other ways", with(|r| r.exchange = false)),
         ("repair of ends and uncovered outline", with(|r| r.repaired = 0)),
+        ("turned looks in doubt", with(|r| r.turned = false)),
         ("a second look in doubt", with(|r| r.second_look = SecondLook::Never)),
         ("the walks' own cost in the choice", with(|r| r.walk_weight = 0.0)),
         ("angles in the proposals", with(|r| r.propose.energy_weight = 0.0)),

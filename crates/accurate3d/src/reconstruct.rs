@@ -197,8 +197,12 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         }
         None => (masks, [0, 0]),
     };
-    let robust =
-        RobustParams { exchange: params.robust.exchange && maps.is_none(), ..params.robust };
+    let drawn = maps.is_none();
+    let robust = RobustParams {
+        exchange: params.robust.exchange && drawn,
+        turned: params.robust.turned && drawn,
+        ..params.robust
+    };
     let maps = maps.filter(|_| params.robust.by_probability);
     let result = reconstruct_masks(masks, maps, &pair.rig, &robust, params.closure, &pair.id)?;
     // The curve was fitted under the corrected camera, if one was asked for.

@@ -86,14 +86,15 @@ impl Frame {
 #[cfg(test)]
 mod tests {
     use accurate_geom::View1;
-    use ndarray::s;
+    use ndarray::Slice;
 
     use super::*;
 
     #[test]
     fn a_point_of_the_turned_part_shows_the_same_pixel_of_the_image() {
         let image = Array2::from_shape_fn((7, 9), |(y, x)| (3 * x + 5 * y) % 4 == 0);
-        let cut = image.slice(s![1..6, 2..8]).to_owned();
+        let rows = image.slice_axis(Axis(0), Slice::from(1..6));
+        let cut = rows.slice_axis(Axis(1), Slice::from(2..8)).to_owned();
         for turn in [Turn::Upright].into_iter().chain(Turn::OTHERS) {
             let frame = Frame::new(turn, [2.0, 1.0], &cut);
             let turned = turn.array(&cut);

@@ -2,10 +2,12 @@
 //! and the fit of one 3D spline to both outlines judges the pairs.
 
 mod candidates;
+mod choice;
 mod evidence;
 mod exchange;
 mod frame;
 mod joint;
+mod look;
 mod other_ways;
 mod repair;
 mod reroute;

@@ -1,0 +1,140 @@
+use accurate_fit::CalibrationEstimate;
+use accurate_geom::{Rig, View1, View2};
+
+use super::candidates::ViewCandidates;
+use super::evidence::{Evidence, Walks};
+use super::score::Candidate;
+use super::search::{Search, Tried};
+use crate::Error;
+
+/// Curves nowhere farther apart than this do not compete, px.
+pub(crate) const RIVAL_PX: f64 = 5.0;
+
+/// A choice with the last, adaptive fits.
+pub(crate) struct Settled {
+    pub(crate) choice: Choice,
+    /// Of the finalists that are close, the likeliest first, as in `choice`.
+    pub(crate) fits: Vec<Candidate>,
+    pub(crate) calibration: Option<CalibrationEstimate>,
+    pub(crate) evidence: Evidence,
+}
+
+impl Settled {
+    /// The likeliest of the finalists that are close, each fitted adaptively: a score weighs all bends
+    /// alike, but one more bend says little of a wire that bends everywhere and much of a straight one.
+    /// `given_rig` is the one that the calibration's correction is relative to.
+    pub(crate) fn of(
+        search: &Search<'_>,
+        mut choice: Choice,
+        given_rig: &Rig,
+        view1: &ViewCandidates<View1>,
+        view2: &ViewCandidates<View2>,
+    ) -> Self {
+        let least = choice.finalists[0].score;
+        let contenders =
+            choice.finalists.iter().take_while(|c| c.score <= least + search.params.contenders);
+        let (mut fits, mut calibrations): (Vec<_>, Vec<_>) =
+            contenders.map(|c| search.last_fit(c, given_rig)).unzip();
+        let first = (0..fits.len())
+            .min_by(|&a, &b| fits[a].unlikeliness().total_cmp(&fits[b].unlikeliness()))
+            .unwrap_or(0);
+        choice.finalists.swap(0, first);
+        fits.swap(0, first);
+        let (fit, rivals) = (&fits[0], &fits[1..]);
+        let close = rivals.iter().map(|rival| (rival.unlikeliness() - fit.unlikeliness(), rival));
+        let far = choice.finalists[fits.len()..].iter();
+        let far = far.map(|rival| (rival.score - least, rival));
+        let margin = close
+            .chain(far)
+            .filter(|(_, rival)| !rival.shape.is_like(&fit.shape, RIVAL_PX))
+            .map(|(behind, _)| behind)
+            .fold(f64::INFINITY, f64::min);
+        let [i, j] = fit.walks;
+        let mut walks = Walks::default();
+        walks.add(&view1.walks, i, view1.cut_ends(i).len() / 2);
+        walks.add(&view2.walks, j, view2.cut_ends(j).len() / 2);
+        let evidence = Evidence::new(fit, &choice.finalists[0].shape, margin, &walks, given_rig);
+        Self { fits, calibration: calibrations.swap_remove(first), evidence, choice }
+    }
+}
+
+pub(crate) struct Choice {
+    /// Different curves, the best first; at least one.
+    pub(crate) finalists: Vec<Candidate>,
+    pub(crate) fits: usize,
+    tried: Vec<Tried>,
+}
+
+/// The search with one rig and one effort, going on from an `earlier` one with less effort.
+pub(crate) fn choose(
+    search: &Search<'_>,
+    view1: &mut ViewCandidates<View1>,
+    view2: &mut ViewCandidates<View2>,
+    earlier: Option<Choice>,
+) -> Result<Choice, Error> {
+    let params = search.params;
+    let (mut found, mut tried, mut fits) = (Vec::new(), Vec::new(), 0);
+    if let Some(earlier) = earlier {
+        found.extend(earlier.finalists);
+        (tried, fits) = (earlier.tried, earlier.fits);
+    }
+    let before = found.len();
+    let pairs =
+        search.propose_and_fit(view1, view2, [0, 0], params.max_fits, &mut tried, &mut found)?;
+    fits += found.len() - before;
+    let mut finalists = search.finalists(found);
+    let mut more = search.restarted(&finalists, &tried, view1, view2);
+    if !more.is_empty() {
+        more.append(&mut finalists);
+        finalists = search.finalists(more);
+    }
+    if params.exchange {
+        let (exchanged, crosses) = search.exchanged(finalists);
+        finalists = exchanged;
+        fits += crosses;
+        let (rerouted, others) = search.rerouted(finalists);
+        finalists = rerouted;
+        fits += others;
+    }
+    let is_good = |list: &[Candidate]| list.first().is_some_and(|best| best.is_good(params));
+    if !is_good(&finalists) {
+        if let Some(best) = finalists.first().cloned() {
+            let mut more = Vec::new();
+            search.rewarded(&best, view1, view2, params.max_fits / 3, &mut more)?;
+            fits += more.len();
+            more.append(&mut finalists);
+            finalists = search.finalists(more);
+        }
+        // All with the same freedom, or the freest would win.
+        let fine: Vec<_> = finalists.iter().filter_map(|c| search.finer(c)).collect();
+        finalists = search.finalists(fine);
+        if !is_good(&finalists) {
+            let mended: Vec<_> =
+                finalists.iter().take(params.repaired).map(|c| search.repaired(c)).collect();
+            finalists.extend(mended);
+            finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
+        }
+    }
+    if finalists.is_empty() {
+        let walks = [view1.walks.len(), view2.walks.len()];
+        return Err(Error::NoCandidate { case: search.case.to_owned(), walks, pairs });
+    }
+    Ok(Choice { finalists, fits, tried })
+}
+
+/// The rings that pairs of closed walks give.
+pub(crate) fn choose_ring(
+    search: &Search<'_>,
+    view1: &ViewCandidates<View1>,
+    view2: &ViewCandidates<View2>,
+) -> Result<Choice, Error> {
+    let mut found = Vec::new();
+    let pairs = search.fit_rings(view1, view2, &mut found)?;
+    let fits = found.len();
+    let finalists = search.finalists(found);
+    if finalists.is_empty() {
+        let walks = [view1.walks.len(), view2.walks.len()];
+        return Err(Error::NoCandidate { case: search.case.to_owned(), walks, pairs });
+    }
+    Ok(Choice { finalists, fits, tried: Vec::new() })
+}

@@ -1,0 +1,143 @@
+use accurate_fit::OutlinePair;
+use accurate_geom::{Pixel, Rig, View1, View2};
+use ndarray::Array2;
+
+use super::RobustParams;
+use super::candidates::ViewCandidates;
+use super::choice::{RIVAL_PX, Settled, choose, choose_ring};
+use super::frame::Turn;
+use super::joint::{JointResult, SecondLook};
+use super::score::Candidate;
+use super::search::{Effort, Search};
+use super::suspicion::{calls_for_a_second_look, suspicions};
+use crate::{Closure, ConsideredCurve, Error, Explanation};
+
+/// What a look at the images takes.
+pub(crate) struct Look<'a> {
+    pub(crate) masks: &'a [Array2<bool>; 2],
+    pub(crate) probabilities: Option<&'a [Array2<f32>; 2]>,
+    pub(crate) rig: &'a Rig,
+    pub(crate) params: &'a RobustParams,
+    pub(crate) closure: Closure,
+    pub(crate) turn: Turn,
+    pub(crate) case: &'a str,
+}
+
+/// What a look at the images came to.
+pub(crate) struct Seen {
+    view1: ViewCandidates<View1>,
+    view2: ViewCandidates<View2>,
+    pub(crate) settled: Settled,
+    /// Other curves that other looks found.
+    passed_over: Vec<ConsideredCurve>,
+    /// Pairs of walks that were fitted, by all looks.
+    fits: usize,
+}
+
+impl Look<'_> {
+    /// Quickly, and thoroughly if in doubt.
+    pub(crate) fn look(&self) -> Result<Seen, Error> {
+        let Self { masks, probabilities, rig, params, closure, turn, case } = *self;
+        let map = |view: usize| probabilities.map(|both| &both[view]);
+        let walks = &params.walks;
+        let mut view1 = ViewCandidates::<View1>::of(&masks[0], map(0), walks, turn, case)?;
+        let mut view2 = ViewCandidates::<View2>::of(&masks[1], map(1), walks, turn, case)?;
+        let (outline1, outline2) = (view1.outline.clone(), view2.outline.clone());
+        let outlines = OutlinePair::new(&outline1, &outline2)
+            .with_bridges(&corridors(&view1.bridges), &corridors(&view2.bridges));
+        let mut search = Search { outlines: &outlines, rig, params, case, effort: Effort::Quick };
+        let mut settle = |search: &Search<'_>, earlier| -> Result<Settled, Error> {
+            let choice = match closure {
+                Closure::Open => choose(search, &mut view1, &mut view2, earlier)?,
+                Closure::Closed => choose_ring(search, &view1, &view2)?,
+            };
+            Ok(Settled::of(search, choice, rig, &view1, &view2))
+        };
+        let mut settled = settle(&search, None)?;
+        let corrected = settled.calibration.as_ref().and_then(|found| found.correct(rig).ok());
+        if let Some(corrected) = &corrected {
+            search.rig = corrected;
+            settled = settle(&search, None)?;
+        }
+        let again = match params.second_look {
+            _ if closure == Closure::Closed => false,
+            SecondLook::Never => false,
+            SecondLook::InDoubt => calls_for_a_second_look(&settled.evidence),
+            SecondLook::Always => true,
+        };
+        if again {
+            search.effort = Effort::Thorough;
+            settled = settle(&search, Some(settled.choice))?;
+        }
+        let fits = settled.choice.fits;
+        Ok(Seen { view1, view2, settled, passed_over: Vec::new(), fits })
+    }
+}
+
+impl Seen {
+    /// The likelier of two looks at the same images, with what the other one knows against it.
+    pub(crate) fn beside(self, other: Self) -> Self {
+        let unlikeliness = |seen: &Self| seen.settled.fits[0].unlikeliness();
+        let (mut seen, passed) =
+            if unlikeliness(&other) < unlikeliness(&self) { (other, self) } else { (self, other) };
+        let best = &seen.settled.fits[0];
+        let rivals =
+            passed.settled.fits.iter().filter(|fit| !fit.shape.is_like(&best.shape, RIVAL_PX));
+        let behind = rivals.clone().map(|rival| rival.unlikeliness() - best.unlikeliness());
+        let margin = &mut seen.settled.evidence.margin;
+        *margin = behind.chain(*margin).min_by(f64::total_cmp);
+        seen.passed_over.extend(rivals.map(Candidate::considered));
+        seen.passed_over.extend(passed.passed_over);
+        seen.fits += passed.fits;
+        seen
+    }
+
+    pub(crate) fn into_result(self) -> JointResult {
+        let Self { view1, view2, settled, passed_over, fits: tried } = self;
+        let Settled { choice, mut fits, calibration, evidence } = settled;
+        let rivals = &choice.finalists[fits.len()..];
+        let candidates =
+            fits.iter().chain(rivals).map(Candidate::considered).chain(passed_over).collect();
+        let best = fits.swap_remove(0);
+        let [i, j] = best.walks;
+        let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
+        let explanation =
+            Explanation { candidates, junctions: [view1.junctions(i), view2.junctions(j)] };
+        JointResult {
+            explanation,
+            walk1: view1.walks[i].points.clone(),
+            walk2: directed(&view2.walks[j].points, best.reversed),
+            coverage,
+            mean_distance_px: best.mean_distance_px,
+            fits: tried,
+            calibration,
+            suspicions: suspicions(&evidence),
+            evidence,
+            fit: best.fit,
+        }
+    }
+}
+
+/// The bridges twice as wide as they come: what hides the body hides how it bends there.
+fn corridors<V: accurate_geom::View>(
+    bridges: &[(Pixel<V>, Pixel<V>)],
+) -> Vec<(Pixel<V>, Pixel<V>)> {
+    const ASIDE_PX: f64 = 4.0;
+    const LONGEST_PX: f64 = 30.0;
+    let mut all = bridges.to_vec();
+    for (a, b) in bridges {
+        let length = a.distance(*b);
+        if length > 2.0 * ASIDE_PX && length < LONGEST_PX {
+            let (nx, ny) = ((b.y - a.y) / length * ASIDE_PX, (a.x - b.x) / length * ASIDE_PX);
+            for side in [-1.0, 1.0] {
+                let moved = |p: &Pixel<V>| Pixel::new(p.x + side * nx, p.y + side * ny);
+                all.push((moved(a), moved(b)));
+            }
+        }
+    }
+    all
+}
+
+fn directed(points: &[Pixel<View2>], reversed: bool) -> Vec<Pixel<View2>> {
+    if reversed { points.iter().rev().copied().collect() } else { points.to_vec() }
+}
