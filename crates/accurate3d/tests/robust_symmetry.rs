@@ -50,10 +50,14 @@ fn curve(rig: &Rig, masks: [Array2<bool>; 2]) -> Vec<Point3> {
 
 /// Every case's largest and mean distance between the two curves stays below the tolerance.
 fn assert_same(other: impl Fn(&Rig, &[Array2<bool>; 2]) -> Vec<Point3>) {
-    // With the two medium cases that differ most of the first 16.
-    for (family, index) in
-        [(Family::Easy, 0), (Family::Easy, 13), (Family::Medium, 4), (Family::Medium, 13)]
-    {
+    // Among those that differ most of the first 16 of each.
+    for (family, index) in [
+        (Family::Easy, 13),
+        (Family::Medium, 4),
+        (Family::Medium, 13),
+        (Family::Hard, 2),
+        (Family::Hard, 6),
+    ] {
         let case = generate(family, 1000, index, &CaseOptions::default()).unwrap();
         let depth: f64 = case.truth.iter().map(|p| case.rig.camera1().depth(p)).sum::<f64>()
             / case.truth.len() as f64;
@@ -75,10 +79,9 @@ fn assert_same_turned(turn: Turn) {
     });
 }
 
-/// Thinning moves by up to 1 px with the turn of an image, so that other pairs of walks are fitted and
-/// another of several nearly equal fits is kept. Of 16 easy and 16 medium cases all agree within
-/// 0.51 px. Not promised for many self-crossings: of 16 hard cases 12 to 15 agree within 1 px, the
-/// others differ by up to tens of px, where several orders of the strands score almost the same.
+/// Whichever way masks lie, the same skeletons are taken of them; what differs is the order in which
+/// fits sum and thin out the outline. Of 16 medium and 16 hard cases all agree within 0.5 and 0.8 px
+/// but for one hard one (7, mirrored: 3.5 px at one place, 0.05 px in the mean).
 const LARGEST_PX: f64 = 1.0;
 const MEAN_PX: f64 = 0.1;
 

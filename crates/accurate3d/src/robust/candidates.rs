@@ -58,6 +58,9 @@ impl<V: View> ViewCandidates<V> {
             None => Vec::new(),
         };
         let (mut cut, origin) = cut_to_body(array);
+        // However a mask lies, the same skeleton is taken of it. (A network sees another image.)
+        let upright = if probability.is_none() { Turn::upright(&cut) } else { Turn::NONE };
+        let turn = upright.then(turn);
         let frame = Frame::new(turn, origin, &cut);
         let mut mask = Mask::from_array(turn.array(&cut)).map_err(segmentation)?;
         if !hints.is_empty() {

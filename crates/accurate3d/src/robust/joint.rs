@@ -127,7 +127,7 @@ pub(crate) fn reconstruct_masks(
     case: &str,
 ) -> Result<JointResult, Error> {
     let look = |turn| Look { masks, probabilities, rig, params, closure, turn, case }.look();
-    let mut seen = look(Turn::Upright)?;
+    let mut seen = look(Turn::NONE)?;
     for turn in Turn::OTHERS {
         let again = match params.second_look {
             // Every pair of closed walks has been fitted from everywhere.

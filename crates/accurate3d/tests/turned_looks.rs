@@ -1,0 +1,38 @@
+//! In doubt the masks are looked at again turned; the likeliest curve of all looks is kept.
+#![allow(clippy::unwrap_used)]
+
+use accurate3d::eval::curve_scores;
+use accurate3d::synth::{CaseOptions, Family, generate};
+use accurate3d::{InputKind, Method, Params, ViewPair, reconstruct};
+
+/// Two strands that run together in both views: upright, no pair of walks comes near the truth (off by
+/// 11.7 px, and in doubt), turned one does.
+#[test]
+fn a_curve_that_no_upright_walk_leads_to_is_found_turned() {
+    let case = generate(Family::Hard, 1223, 67, &CaseOptions::default()).unwrap();
+    let (truth, camera) = (case.truth.clone(), case.rig.camera1().clone());
+    let depth = truth.iter().map(|p| camera.depth(p)).sum::<f64>() / truth.len() as f64;
+    let per_px = depth / camera.k()[(0, 0)].abs();
+    let pair = ViewPair::from(case);
+    let mut params = Params::new(InputKind::Mask, Method::Accurate);
+    let [turned, upright] = [true, false].map(|turned| {
+        params.robust.turned = turned;
+        let found = reconstruct(&pair, &params).unwrap();
+        let off_px =
+            curve_scores(&found.positions(), &truth, 0.5 * per_px).unwrap().hausdorff / per_px;
+        (off_px, found)
+    });
+    assert!(turned.0 < 2.0, "{} px", turned.0);
+    assert!(upright.0 > 5.0 && !upright.1.diagnostics.suspicions.is_empty(), "{} px", upright.0);
+    // What the upright look preferred stays among the curves that were considered.
+    let considered = |found: &accurate3d::Reconstruction| found.explanation.candidates.len();
+    assert!(considered(&turned.1) > 1);
+    // Points of the walk lie in the image as it was given, on the body.
+    let masks = pair.masks.as_ref().unwrap();
+    let on_body = |p: &accurate3d::geom::Pixel<accurate3d::geom::View1>| {
+        masks[0].get((p.y.round() as usize, p.x.round() as usize)).is_some_and(|set| *set)
+    };
+    let walk = &turned.1.traces.points1;
+    let hits = walk.iter().filter(|p| on_body(p)).count();
+    assert!(hits * 100 >= walk.len() * 99, "{hits} of {}", walk.len());
+}
