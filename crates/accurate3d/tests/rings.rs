@@ -6,7 +6,8 @@ mod rings;
 
 use accurate3d::synth::{CaseOptions, Family, generate};
 use accurate3d::{Error, Suspicion, ViewPair};
-use rings::{Ring, Shown, reconstruct_ring, ring_pair};
+use ndarray::Array2;
+use rings::{Ring, Shown, reconstruct_ring, ring_pair, ring_rig};
 
 const SEED: u64 = 1931;
 /// One unit is 1.2 px: a ring in the wrong direction is off by tens.
@@ -72,5 +73,32 @@ fn an_open_body_is_no_ring() {
     match reconstruct_ring(&ViewPair { points: None, ..ViewPair::from(case) }) {
         Err(Error::NotClosed { view: 1, tips, .. }) => assert!(tips >= 1),
         other => panic!("{other:?}"),
+    }
+}
+
+/// A pixel, a blob, a line and the smallest rings: refused, or a finite closed curve.
+#[test]
+fn what_is_hardly_a_ring_is_refused_or_closed_but_never_nan() {
+    let drawn = |shown: fn(i64, i64) -> bool| {
+        let mask =
+            Array2::from_shape_fn((512, 512), |(y, x)| shown(x as i64 - 255, y as i64 - 255));
+        [mask.clone(), mask]
+    };
+    let shapes: [fn(i64, i64) -> bool; 6] = [
+        |x, y| (x, y) == (0, 0),
+        |x, y| x * x + y * y < 400,
+        |x, y| y.abs() < 2 && x.abs() < 60,
+        |x, y| x.abs().max(y.abs()) == 1,
+        |x, y| (9..=20).contains(&(x * x + y * y)),
+        |x, y| (30..=60).contains(&(x * x + y * y)),
+    ];
+    for (index, shape) in shapes.into_iter().enumerate() {
+        let pair = ViewPair { masks: Some(drawn(shape)), ..ViewPair::new("shape", ring_rig()) };
+        if let Ok(found) = reconstruct_ring(&pair) {
+            assert!(found.diagnostics.closed, "{index}");
+            let positions = found.positions();
+            assert_eq!(positions.first(), positions.last(), "{index}");
+            assert!(positions.iter().all(|p| p.iter().all(|x| x.is_finite())), "{index}");
+        }
     }
 }

@@ -12,7 +12,7 @@ use crate::unrolled::Unrolled;
 
 /// Closed walks of each view that are paired, the cheapest first.
 const CLOSED_WALKS: usize = 4;
-/// Every so manieth point of a walk is matched around; the start is matched with all of them.
+/// Every fourth point of a walk is matched around; the start of a fit is matched with all of them.
 const STRIDE: usize = 4;
 
 impl Search<'_> {
