@@ -12,9 +12,10 @@ use crate::{Error, Params, Reconstruction, Suspicion, ViewPair};
 /// Fewest points of a closed curve: with less there is no ring to speak of.
 const FEWEST: usize = 12;
 
-/// Ordered points of a closed curve in both views: matched around in both directions, cut open where the match is surest, and fitted as an open
-/// curve that goes once around and somewhat more on both sides: what is kept, in the middle, does not
-/// feel where it was cut. The likelier direction is kept. The last point repeats the first.
+/// Ordered points of a closed curve in both views: matched around in both directions, cut open where
+/// the match is surest, and fitted as an open curve that goes once around and somewhat more on both
+/// sides: what is kept, in the middle, does not feel where it was cut. The likelier direction is kept.
+/// The last point repeats the first.
 ///
 /// # Errors
 /// [`Error::Matching`]; [`Error::Fitting`], also for fewer than 12 points.
@@ -111,12 +112,16 @@ impl Directions<'_> {
             // Begin and end are one point, in the right direction of both views at once.
             let fitted = self.fitted(direction.once(), false, alike)?;
             let surprise = fitted.surprise_of_direction();
-            let behind = best.as_ref().map_or(f64::INFINITY, |best| best.surprise - surprise);
             match &mut best {
-                Some(best) if behind <= 0.0 => best.lead = -behind,
+                Some(best) if surprise >= best.surprise => {
+                    // Neither leads where both are refused.
+                    let lead = surprise - best.surprise;
+                    best.lead = if lead.is_nan() { 0.0 } else { lead };
+                }
                 _ => {
+                    let lead = best.map_or(f64::INFINITY, |best| best.surprise - surprise);
                     let matched = direction.matched;
-                    best = Some(Direction { matched, found, surprise, lead: behind });
+                    best = Some(Direction { matched, found, surprise, lead });
                 }
             }
         }

@@ -133,7 +133,7 @@ pub(crate) fn reconstruct_masks(
             // Every pair of closed walks has been fitted from everywhere.
             _ if closure == Closure::Closed || !params.turned => false,
             SecondLook::Never => false,
-            SecondLook::InDoubt => !suspicions(&seen.settled.evidence).is_empty(),
+            SecondLook::InDoubt => !suspicions(&seen.evidence()).is_empty(),
             SecondLook::Always => true,
         };
         if !again {

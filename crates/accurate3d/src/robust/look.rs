@@ -5,12 +5,13 @@ use ndarray::Array2;
 use super::RobustParams;
 use super::candidates::ViewCandidates;
 use super::choice::{RIVAL_PX, Settled, choose, choose_ring};
+use super::evidence::Evidence;
 use super::frame::Turn;
 use super::joint::{JointResult, SecondLook};
 use super::score::Candidate;
 use super::search::{Effort, Search};
 use super::suspicion::{calls_for_a_second_look, suspicions};
-use crate::{Closure, ConsideredCurve, Error, Explanation};
+use crate::{Closure, Error, Explanation};
 
 /// What a look at the images takes.
 pub(crate) struct Look<'a> {
@@ -27,9 +28,9 @@ pub(crate) struct Look<'a> {
 pub(crate) struct Seen {
     view1: ViewCandidates<View1>,
     view2: ViewCandidates<View2>,
-    pub(crate) settled: Settled,
-    /// Other curves that other looks found.
-    passed_over: Vec<ConsideredCurve>,
+    settled: Settled,
+    /// What other looks settled on.
+    others: Vec<Candidate>,
     /// Pairs of walks that were fitted, by all looks.
     fits: usize,
 }
@@ -70,7 +71,7 @@ impl Look<'_> {
             settled = settle(&search, Some(settled.choice))?;
         }
         let fits = settled.choice.fits;
-        Ok(Seen { view1, view2, settled, passed_over: Vec::new(), fits })
+        Ok(Seen { view1, view2, settled, others: Vec::new(), fits })
     }
 }
 
@@ -80,24 +81,33 @@ impl Seen {
         let unlikeliness = |seen: &Self| seen.settled.fits[0].unlikeliness();
         let (mut seen, passed) =
             if unlikeliness(&other) < unlikeliness(&self) { (other, self) } else { (self, other) };
-        let best = &seen.settled.fits[0];
-        let rivals =
-            passed.settled.fits.iter().filter(|fit| !fit.shape.is_like(&best.shape, RIVAL_PX));
-        let behind = rivals.clone().map(|rival| rival.unlikeliness() - best.unlikeliness());
-        let margin = &mut seen.settled.evidence.margin;
-        *margin = behind.chain(*margin).min_by(f64::total_cmp);
-        seen.passed_over.extend(rivals.map(Candidate::considered));
-        seen.passed_over.extend(passed.passed_over);
+        seen.others.extend(passed.settled.fits);
+        seen.others.extend(passed.others);
         seen.fits += passed.fits;
         seen
     }
 
+    /// What bears on the choice, the curves of all looks among it.
+    pub(crate) fn evidence(&self) -> Evidence {
+        let best = self.settled.fits[0].unlikeliness();
+        let behind = self.rivals().map(|rival| rival.unlikeliness() - best);
+        let margin = behind.chain(self.settled.evidence.margin).min_by(f64::total_cmp);
+        Evidence { margin, ..self.settled.evidence }
+    }
+
+    /// Other curves than the best that other looks settled on.
+    fn rivals(&self) -> impl Iterator<Item = &Candidate> {
+        let best = &self.settled.fits[0].shape;
+        self.others.iter().filter(move |other| !other.shape.is_like(best, RIVAL_PX))
+    }
+
     pub(crate) fn into_result(self) -> JointResult {
-        let Self { view1, view2, settled, passed_over, fits: tried } = self;
-        let Settled { choice, mut fits, calibration, evidence } = settled;
-        let rivals = &choice.finalists[fits.len()..];
-        let candidates =
-            fits.iter().chain(rivals).map(Candidate::considered).chain(passed_over).collect();
+        let evidence = self.evidence();
+        let Settled { choice, fits, .. } = &self.settled;
+        let rivals = choice.finalists[fits.len()..].iter().chain(self.rivals());
+        let candidates = fits.iter().chain(rivals).map(Candidate::considered).collect();
+        let Self { view1, view2, settled, fits: tried, .. } = self;
+        let Settled { mut fits, calibration, .. } = settled;
         let best = fits.swap_remove(0);
         let [i, j] = best.walks;
         let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
