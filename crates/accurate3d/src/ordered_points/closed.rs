@@ -1,9 +1,9 @@
 use accurate_fit::{FitError, PointFitParams};
 use accurate_geom::{Pixel, Rig, View1, View2};
-use accurate_match::{FreeMatch, MatchError, TangencyParams};
+use accurate_match::{FreeMatch, MatchError};
 
 use super::adjusted::Adjusted;
-use super::{Curves, Found, matcher, under_better_calibration, whole_pixels};
+use super::{Curves, Found, matcher, tangency, under_better_calibration, whole_pixels};
 use crate::diagnostics::Adjustment;
 use crate::sampled_curve::{SampledCurve, sampled_ring};
 use crate::unrolled::{Unrolled, without_repeat};
@@ -97,7 +97,7 @@ impl Directions<'_> {
     /// The direction whose fit is the likelier; of two equal ones, curve 2 as it was given.
     fn likelier(&self) -> Result<Direction, MatchError> {
         let Self { points1, points2, rig, .. } = *self;
-        let matcher = matcher(self.tangency());
+        let matcher = matcher(tangency(self.whole));
         let unrolled = Unrolled::in_both_directions(points1, points2, 1, &matcher, rig)?;
         let mut found = Vec::with_capacity(unrolled.len());
         for direction in &unrolled {
@@ -135,12 +135,8 @@ impl Directions<'_> {
         fit_params: PointFitParams,
     ) -> Result<Found, MatchError> {
         let Self { whole, rig, given_rig, .. } = *self;
-        let matched = matcher(self.tangency()).match_directed(points1, points2, false, rig)?;
+        let matched = matcher(tangency(self.whole)).match_directed(points1, points2, false, rig)?;
         let curves = Curves { points1, points2, whole, cut, rig, given_rig, fit_params };
         Ok(curves.fitted(matched))
-    }
-
-    fn tangency(&self) -> TangencyParams {
-        if self.whole { TangencyParams::WHOLE_PIXELS } else { TangencyParams::DEFAULT }
     }
 }

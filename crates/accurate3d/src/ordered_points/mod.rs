@@ -129,7 +129,7 @@ impl Curves<'_> {
     /// Matched and fitted, in both directions where the match cannot tell them apart.
     fn found(&self) -> Result<Found, MatchError> {
         let Self { points1, points2, rig, .. } = *self;
-        let matcher = matcher(self.tangency());
+        let matcher = matcher(tangency(self.whole));
         let found = self.fitted(matcher.match_best_direction(points1, points2, rig)?);
         let margin_px = found.matched.margin_px.unwrap_or(f64::INFINITY);
         if margin_px < DOUBTFUL_DIRECTION_PX {
@@ -150,7 +150,7 @@ impl Curves<'_> {
             directed2.reverse();
         }
         let mut parts = vec![MatchedPart::of(&matched, points1.len(), &directed2)];
-        let tangency = self.tangency();
+        let tangency = tangency(self.whole);
         for max_sine in OTHER_SINES.into_iter().filter(|sine| *sine < tangency.max_sine) {
             let matcher = matcher(TangencyParams { max_sine, ..tangency });
             if let Ok(other) = matcher.match_directed(points1, points2, matched.reversed, rig) {
@@ -195,10 +195,10 @@ impl Curves<'_> {
             matched,
         }
     }
+}
 
-    fn tangency(&self) -> TangencyParams {
-        if self.whole { TangencyParams::WHOLE_PIXELS } else { TangencyParams::DEFAULT }
-    }
+fn tangency(whole: bool) -> TangencyParams {
+    if whole { TangencyParams::WHOLE_PIXELS } else { TangencyParams::DEFAULT }
 }
 
 fn matcher(tangency: TangencyParams) -> FreeMatcher {

@@ -69,6 +69,16 @@ pub enum SecondLook {
     Always,
 }
 
+impl SecondLook {
+    pub(crate) const fn is_due(self, in_doubt: bool) -> bool {
+        match self {
+            Self::Never => false,
+            Self::InDoubt => in_doubt,
+            Self::Always => true,
+        }
+    }
+}
+
 impl RobustParams {
     /// Tuned on seeds 1000 to 1999 of the generated families.
     pub const DEFAULT: Self = Self {
@@ -129,13 +139,10 @@ pub(crate) fn reconstruct_masks(
     let look = |turn| Look { masks, probabilities, rig, params, closure, turn, case }.look();
     let mut seen = look(Turn::NONE)?;
     for turn in Turn::OTHERS {
-        let again = match params.second_look {
-            // Every pair of closed walks has been fitted from everywhere.
-            _ if closure == Closure::Closed || !params.turned => false,
-            SecondLook::Never => false,
-            SecondLook::InDoubt => !suspicions(&seen.evidence()).is_empty(),
-            SecondLook::Always => true,
-        };
+        let in_doubt = !suspicions(&seen.evidence()).is_empty();
+        // Every pair of closed walks has been fitted from everywhere.
+        let again =
+            closure == Closure::Open && params.turned && params.second_look.is_due(in_doubt);
         if !again {
             break;
         }

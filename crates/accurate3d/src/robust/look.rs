@@ -7,7 +7,7 @@ use super::candidates::ViewCandidates;
 use super::choice::{RIVAL_PX, Settled, choose, choose_ring};
 use super::evidence::Evidence;
 use super::frame::Turn;
-use super::joint::{JointResult, SecondLook};
+use super::joint::JointResult;
 use super::score::Candidate;
 use super::search::{Effort, Search};
 use super::suspicion::{calls_for_a_second_look, suspicions};
@@ -60,12 +60,8 @@ impl Look<'_> {
             search.rig = corrected;
             settled = settle(&search, None)?;
         }
-        let again = match params.second_look {
-            _ if closure == Closure::Closed => false,
-            SecondLook::Never => false,
-            SecondLook::InDoubt => calls_for_a_second_look(&settled.evidence),
-            SecondLook::Always => true,
-        };
+        let in_doubt = calls_for_a_second_look(&settled.evidence);
+        let again = closure == Closure::Open && params.second_look.is_due(in_doubt);
         if again {
             search.effort = Effort::Thorough;
             settled = settle(&search, Some(settled.choice))?;
