@@ -13,6 +13,7 @@ mod shared_data;
 use std::path::Path;
 
 use accurate3d::eval::curve_scores;
+use accurate3d::fit::CalibrationPriors;
 use accurate3d::geom::nalgebra::Matrix3x4;
 use accurate3d::geom::{Camera, ImageSize, LengthUnit, Pixel, Point2, Point3, Rig, View};
 use accurate3d::io::read_mask;
@@ -94,7 +95,14 @@ fn branches_of_the_phantom_come_back_near_the_floor_of_their_skeletons() {
     {
         let [a, b, c] = [first, second, third].map(|name| XaView::read(&dir, &geometry, name));
         let rig = Rig::new(a.camera.clone(), b.camera.clone(), LengthUnit::Millimetre).unwrap();
-        for method in [Method::Paper, Method::Accurate] {
+        let estimated = Some(CalibrationPriors::DEFAULT);
+        for (method, calibration, name) in [
+            (Method::Paper, None, "paper"),
+            (Method::Accurate, None, "accurate"),
+            // The published cameras and the skeletons together are 0 to 4 px off across the epipolar
+            // lines, by branch.
+            (Method::Accurate, estimated, "accurate, calibration estimated"),
+        ] {
             let mut errors = Vec::new();
             for (index, branch) in branches.iter().enumerate() {
                 let points = (a.ordered(branch), b.ordered(branch));
@@ -104,7 +112,9 @@ fn branches_of_the_phantom_come_back_near_the_floor_of_their_skeletons() {
                 }
                 let id = format!("branch-{}", index + 1);
                 let pair = ViewPair { points: Some(points), ..ViewPair::new(id, rig.clone()) };
-                let curve = reconstruct(&pair, &Params::new(InputKind::Points, method)).unwrap();
+                let mut params = Params::new(InputKind::Points, method);
+                params.robust.calibration = calibration;
+                let curve = reconstruct(&pair, &params).unwrap();
                 let positions = curve.positions();
                 let scores = curve_scores(&positions, branch, 0.2).unwrap();
                 let third_view: Vec<f64> = positions
@@ -113,7 +123,7 @@ fn branches_of_the_phantom_come_back_near_the_floor_of_their_skeletons() {
                     .collect();
                 let third_px = third_view.iter().sum::<f64>() / third_view.len() as f64;
                 eprintln!(
-                    "{first}+{second}, {method}, branch {:2}: mean {:.2} mm, max {:.2} mm, third \
+                    "{first}+{second}, {name}, branch {:2}: mean {:.2} mm, max {:.2} mm, third \
                      view {third} {third_px:.2} px",
                     index + 1,
                     scores.accuracy,
@@ -125,13 +135,13 @@ fn branches_of_the_phantom_come_back_near_the_floor_of_their_skeletons() {
             let mean = errors.iter().sum::<f64>() / errors.len() as f64;
             let median = errors[errors.len() / 2];
             eprintln!(
-                "{first}+{second}, {method}: {} branches, mean {mean:.2} mm, median {median:.2} mm \
+                "{first}+{second}, {name}: {} branches, mean {mean:.2} mm, median {median:.2} mm \
                  (floor {floor_mm})",
                 errors.len()
             );
             // The pairs are found here, not given; tangent stretches of thick tubes leave their
             // depth open, and where tubes cross the reference snaps to the wrong one's skeleton.
-            assert!(median < 4.0 * floor_mm, "{first}+{second}, {method}: {median}");
+            assert!(median < 4.0 * floor_mm, "{first}+{second}, {name}: {median}");
         }
     }
 }
