@@ -2,24 +2,29 @@
 //!
 //! `cargo run --release -p accurate3d --features rten --example segmentation_study -- WHAT MODEL SEED COUNT [GENERATOR | IMAGE...]`
 //!
-//! WHAT is `score` (recall, precision and clDice at 2 px, with the model's own post-processing) or
+//! WHAT is `score` (recall and precision at 2 px, clDice, mean distance of the skeletons' pixels both
+//! ways, with the model's own post-processing) or
 //! `tune` (the same over a grid of thresholds, smallest pieces and spurs; the best are printed last;
-//! seed 1500 is for this). GENERATOR is `training` (the default), `held-out` or `phantom`. With images, wires
-//! are drawn onto their middle squares instead of onto generated anatomy, and COUNT images are made of
-//! them in turn.
+//! seed 1500 is for this). GENERATOR is `training` (the default), `held-out`, `phantom`, or a family of
+//! cases (`medium`, `carm`, ...), of whose pictures both views are taken. With images, wires are drawn
+//! onto their middle squares instead of onto generated anatomy, and COUNT images are made of them in
+//! turn.
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;
 use std::path::Path;
+use std::str::FromStr;
 
-use accurate3d::eval::{cl_dice, skeleton_agreement};
+use accurate3d::eval::{centreline_distance, cl_dice, skeleton_agreement};
+use accurate3d::geom::Point2;
 use accurate3d::io::{read_file, read_grey};
 use accurate3d::seg::network::{
     MAX_MODEL_BYTES, ModelBundle, NetworkOptions, NetworkSegmenter, RtenEngine,
 };
 use accurate3d::seg::{Mask, PostProcessing, Segmenter, unwatched, zhang_suen};
 use accurate3d::synth::{
-    XrayDomain, XraySample, draw_xray, draw_xray_held_out, draw_xray_onto, draw_xray_phantom,
+    CaseOptions, Family, XrayDomain, XrayOptions, draw_xray, draw_xray_held_out, draw_xray_onto,
+    draw_xray_phantom, generate, render_xray,
 };
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -43,10 +48,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut seen = Vec::new();
     for index in 0..count {
-        let sample = images.sample(seed, index)?;
-        if sample.mask.iter().any(|set| *set) {
-            let image = sample.image.mapv(f32::from);
-            seen.push((segmenter.segment(&image, &unwatched)?.probability, sample.mask));
+        let (image, mask) = images.sample(seed, index)?;
+        if mask.iter().any(|set| *set) {
+            seen.push((segmenter.segment(&image, &unwatched)?.probability, mask));
         }
     }
     println!("{} of {count} images show a wire; {}", seen.len(), segmenter.describe());
@@ -63,6 +67,8 @@ enum Images {
     Training,
     HeldOut,
     Phantom,
+    /// Both views of cases.
+    Pairs(Family),
     /// Wires on these squares.
     Onto(Vec<Array2<u8>>),
 }
@@ -73,6 +79,7 @@ impl Images {
             [] | ["training"] => Self::Training,
             ["held-out"] => Self::HeldOut,
             ["phantom"] => Self::Phantom,
+            [name] if Family::from_str(name).is_ok() => Self::Pairs(Family::from_str(name)?),
             files => {
                 let squares = files.iter().map(|file| square_of(Path::new(file)));
                 Self::Onto(squares.collect::<Result<_, _>>()?)
@@ -80,18 +87,26 @@ impl Images {
         })
     }
 
-    fn sample(&self, seed: u64, index: u64) -> Result<XraySample, Box<dyn Error>> {
+    /// The image and its mask.
+    fn sample(&self, seed: u64, index: u64) -> Result<(Array2<f32>, Array2<bool>), Box<dyn Error>> {
         let side = SIDE as u32;
         let domain = XrayDomain { side_px: side, ..XrayDomain::default() };
-        Ok(match self {
+        let sample = match self {
             Self::Training => draw_xray(&domain, seed, index)?,
             Self::HeldOut => draw_xray_held_out(side, seed, index)?,
             Self::Phantom => draw_xray_phantom(side, seed, index)?,
+            Self::Pairs(family) => {
+                let case = generate(*family, seed, index / 2, &CaseOptions::default())?;
+                let view = (index % 2) as usize;
+                let pictures = render_xray(&case, &XrayOptions::default());
+                return Ok((pictures[view].mapv(f32::from), case.masks[view].clone()));
+            }
             Self::Onto(squares) => {
                 let square = &squares[(index % squares.len() as u64) as usize];
                 draw_xray_onto(&domain, square, seed, index)?
             }
-        })
+        };
+        Ok((sample.image.mapv(f32::from), sample.mask))
     }
 }
 
@@ -112,11 +127,12 @@ fn square_of(path: &Path) -> Result<Array2<u8>, Box<dyn Error>> {
 }
 
 /// Means over images; one in which nothing was found counts as 0 in recall and clDice, and not in
-/// precision.
+/// precision and distance.
 struct Scores {
     recall: f64,
     precision: f64,
     cl_dice: f64,
+    centreline_px: f64,
     nothing_found: usize,
 }
 
@@ -140,16 +156,19 @@ impl Scores {
                     skeleton_agreement(a, b, TOLERANCE_PX).map_err(|e| e.to_string())?;
                 let dice = cl_dice(found.as_array().view(), truth.view(), a, b)
                     .map_err(|e| e.to_string())?;
-                Ok(Some([agreement.recall, agreement.precision, dice]))
+                let distance = centreline_distance(&pixels(&thin), &pixels(&true_thin))
+                    .map_err(|e| e.to_string())?;
+                Ok(Some([agreement.recall, agreement.precision, dice, distance.mean]))
             })
             .collect::<Result<Vec<_>, String>>()?;
-        let found: Vec<[f64; 3]> = each.iter().flatten().copied().collect();
+        let found: Vec<[f64; 4]> = each.iter().flatten().copied().collect();
         let sum = |k: usize| found.iter().map(|v| v[k]).sum::<f64>();
         let (all, some) = (each.len().max(1) as f64, found.len().max(1) as f64);
         Ok(Self {
             recall: sum(0) / all,
             precision: sum(1) / some,
             cl_dice: sum(2) / all,
+            centreline_px: sum(3) / some,
             nothing_found: each.len() - found.len(),
         })
     }
@@ -164,14 +183,21 @@ impl std::fmt::Display for Scores {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "recall {:.4} precision {:.4} F {:.4} clDice {:.4}, nothing found in {}",
+            "recall {:.4} precision {:.4} F {:.4} clDice {:.4} centreline {:.2} px, nothing found in {}",
             self.recall,
             self.precision,
             self.f_score(),
             self.cl_dice,
+            self.centreline_px,
             self.nothing_found
         )
     }
+}
+
+/// Each pixel of a skeleton as a point of its own.
+fn pixels(thin: &Mask) -> Vec<Vec<Point2>> {
+    let set = thin.as_array().indexed_iter().filter(|(_, set)| **set);
+    set.map(|((row, column), _)| vec![Point2::new(column as f64, row as f64)]).collect()
 }
 
 fn tune(seen: &[(Array2<f32>, Array2<bool>)]) -> Result<(), Box<dyn Error>> {

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use super::evidence::Evidence;
 use super::frame::Turn;
 use super::look::Look;
-use super::suspicion::{Suspicion, suspicions};
+use super::suspicion::{Limits, Suspicion, suspicions};
 use crate::{Closure, Error, Explanation};
 
 /// How hard the joint choice looks.
@@ -137,9 +137,10 @@ pub(crate) fn reconstruct_masks(
     case: &str,
 ) -> Result<JointResult, Error> {
     let look = |turn| Look { masks, probabilities, rig, params, closure, turn, case }.look();
+    let limits = if probabilities.is_some() { &Limits::MAPS } else { &Limits::MASKS };
     let mut seen = look(Turn::NONE)?;
     for turn in Turn::OTHERS {
-        let in_doubt = !suspicions(&seen.evidence()).is_empty();
+        let in_doubt = !suspicions(&seen.evidence(), limits).is_empty();
         // Every pair of closed walks has been fitted from everywhere.
         let again =
             closure == Closure::Open && params.turned && params.second_look.is_due(in_doubt);
@@ -151,5 +152,5 @@ pub(crate) fn reconstruct_masks(
             seen = seen.beside(other);
         }
     }
-    Ok(seen.into_result())
+    Ok(seen.into_result(limits))
 }
