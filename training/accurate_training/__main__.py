@@ -1,4 +1,4 @@
-"""`python -m accurate_training train|export|evaluate|ablate|plot|card|fixture`."""
+"""`python -m accurate_training train|export|average|evaluate|ablate|plot|card|fixture`."""
 
 import argparse
 import sys
@@ -87,6 +87,12 @@ def _evaluate(options: argparse.Namespace) -> None:
         write_results(options.output, results, {"shards": options.shards.name, "images": len(images)})
 
 
+def _average(options: argparse.Namespace) -> None:
+    from .average import average_weights
+
+    average_weights(options.before, options.after, options.share, options.output)
+
+
 def _ablate(options: argparse.Namespace) -> None:
     import torch
 
@@ -155,6 +161,13 @@ def _parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--columns", default="recall 2 px,precision 2 px,clDice,Dice,Betti-0 error,centreline px")
     evaluate.add_argument("--output", type=Path, help="JSON with every image's scores")
     evaluate.set_defaults(run_command=_evaluate)
+
+    average = commands.add_parser("average", help="write the network between two of one course of training")
+    average.add_argument("before", type=Path)
+    average.add_argument("after", type=Path)
+    average.add_argument("output", type=Path)
+    average.add_argument("--share", type=float, default=0.75, help="of the later network")
+    average.set_defaults(run_command=_average)
 
     ablate = commands.add_parser("ablate", help="train short runs with different losses and score them")
     ablate.add_argument("--shards", type=Path, required=True)

@@ -113,3 +113,28 @@ def test_weights_of_another_width_are_refused(tmp_path):
 def test_a_missing_checkpoint_is_exit_code_two(tmp_path, capsys):
     assert main(["export", str(tmp_path / "none.pt"), str(tmp_path / "out.onnx")]) == 2
     assert "none.pt" in capsys.readouterr().err
+
+
+def test_an_average_lies_between_two_networks_and_refuses_another_shape(tmp_path):
+    paths = []
+    for seed in (1, 2):
+        path = tmp_path / f"{seed}.onnx"
+        export_onnx(build_network(4, seed), path, half_weights=True, metadata={})
+        paths.append(path)
+
+    def weights(path):
+        return {i.name: onnx.numpy_helper.to_array(i) for i in onnx.load(path).graph.initializer}
+
+    for share, same_as in [("0", paths[0]), ("1", paths[1])]:
+        main(["average", *map(str, paths), str(tmp_path / "same.onnx"), "--share", share])
+        expected = weights(same_as)
+        assert all(np.array_equal(value, expected[name]) for name, value in weights(tmp_path / "same.onnx").items())
+    main(["average", *map(str, paths), str(tmp_path / "mean.onnx"), "--share", "0.25"])
+    first, second, mean = (weights(path) for path in [*paths, tmp_path / "mean.onnx"])
+    for name, value in mean.items():
+        if value.dtype == np.float16:
+            exact = 0.75 * first[name].astype(np.float64) + 0.25 * second[name]
+            assert np.abs(value - exact).max() <= 2.0**-11 * np.abs(exact).max()
+    export_onnx(build_network(8, 1), tmp_path / "wider.onnx", half_weights=True, metadata={})
+    assert main(["average", str(tmp_path / "wider.onnx"), str(paths[1]), str(tmp_path / "none.onnx")]) != 0
+    assert not (tmp_path / "none.onnx").exists()

@@ -154,8 +154,12 @@ impl FreeMatcher {
         self.finish(best, curve2, rig, Some(margin))
     }
 
-    /// Matches two closed curves, each cut anywhere, in the better direction. The first point is not
-    /// repeated at the end. There are no free ends and no gaps.
+    /// Matches two closed curves, each cut anywhere, in both directions of the second: as it was given
+    /// first, then backwards; one of them if the other is impossible. The first point is not repeated
+    /// at the end. There are no free ends and no gaps. [`FreeMatch::margin_px`] is how much dearer the
+    /// other direction is, below 0 for the dearer one: a ring that faces both cameras matches in both
+    /// directions, each of its halves with either of the other view, and which one it is only bending
+    /// can tell.
     ///
     /// # Errors
     /// As [`match_directed`](Self::match_directed).
@@ -167,28 +171,20 @@ impl FreeMatcher {
         curve1: &[Pixel<View1>],
         curve2: &[Pixel<View2>],
         rig: &Rig,
-    ) -> Result<FreeMatch, MatchError> {
-        let (best, margin) = better(
-            self.closed(curve1, curve2, false, rig),
-            self.closed(curve1, curve2, true, rig),
-        )?;
-        self.finish(best, curve2, rig, Some(margin))
-    }
-
-    /// Matches two closed curves whose direction is known: curve 2 is read backwards if `reversed`.
-    /// A ring that faces both cameras matches in both directions, each of its halves with either of
-    /// the other view: which one it is only bending can tell.
-    ///
-    /// # Errors
-    /// As [`match_directed`](Self::match_directed).
-    pub fn match_closed_directed(
-        &self,
-        curve1: &[Pixel<View1>],
-        curve2: &[Pixel<View2>],
-        reversed: bool,
-        rig: &Rig,
-    ) -> Result<FreeMatch, MatchError> {
-        self.finish(self.closed(curve1, curve2, reversed, rig)?, curve2, rig, None)
+    ) -> Result<Vec<FreeMatch>, MatchError> {
+        let around =
+            |reversed| self.finish(self.closed(curve1, curve2, reversed, rig)?, curve2, rig, None);
+        let mut around = match (around(false), around(true)) {
+            (Ok(given), Ok(backwards)) => vec![given, backwards],
+            (Ok(only), Err(MatchError::NoFinitePath { .. }))
+            | (Err(MatchError::NoFinitePath { .. }), Ok(only)) => vec![only],
+            (Err(error), _) | (_, Err(error)) => return Err(error),
+        };
+        if let [given, backwards] = &mut around[..] {
+            let margin_px = backwards.mean_cost_px - given.mean_cost_px;
+            (given.margin_px, backwards.margin_px) = (Some(margin_px), Some(-margin_px));
+        }
+        Ok(around)
     }
 
     fn open(

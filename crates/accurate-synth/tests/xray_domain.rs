@@ -152,6 +152,8 @@ fn bad_ranges_are_named() {
         ("empty_probability", XrayDomain { empty_probability: 1.1, ..small() }),
         ("least_contrast_to_noise", XrayDomain { least_contrast_to_noise: -1.0, ..small() }),
         ("pair_probability", XrayDomain { pair_probability: 1.5, ..small() }),
+        ("pair_families", XrayDomain { pair_families: Vec::new(), ..small() }),
+        ("pair_width_px", XrayDomain { pair_width_px: 0.5..=5.0, ..small() }),
     ];
     for (expected, domain) in bad {
         match draw_xray(&domain, 0, 0) {

@@ -21,14 +21,11 @@ const OVERLAP_PX: f64 = 80.0;
 const MOST_OVERLAP: f64 = 0.45;
 
 impl Unrolled {
-    /// Two closed curves, matched in both directions of the second, as it was given first; one if the
-    /// other is impossible. A ring that faces both cameras matches in both, one as well as the other:
-    /// in the wrong one its halves have changed places in one view, which only its bends tell. The
-    /// first point of a curve may be repeated at its end. Both are cut at the same point of curve 1.
-    /// Only every `stride`th point is matched, which leaves less than a `stride²`th of the cost.
+    /// Two closed curves in the directions of [`FreeMatcher::match_closed`], all cut at the same point
+    /// of curve 1. The first point of a curve may be repeated at its end. Only every `stride`th point is matched, which leaves less than a `stride²`th of the cost.
     ///
     /// # Errors
-    /// As [`FreeMatcher::match_closed_directed`].
+    /// As [`FreeMatcher::match_closed`].
     pub(crate) fn in_both_directions(
         points1: &[Pixel<View1>],
         points2: &[Pixel<View2>],
@@ -39,17 +36,7 @@ impl Unrolled {
         let curves = (without_repeat(points1), without_repeat(points2));
         let points1: Vec<_> = curves.0.iter().copied().step_by(stride).collect();
         let points2: Vec<_> = curves.1.iter().copied().step_by(stride).collect();
-        let around = |reversed| matcher.match_closed_directed(&points1, &points2, reversed, rig);
-        let mut around = match (around(false), around(true)) {
-            (Ok(one), Ok(other)) => vec![one, other],
-            (Ok(only), Err(MatchError::NoFinitePath { .. }))
-            | (Err(MatchError::NoFinitePath { .. }), Ok(only)) => vec![only],
-            (Err(error), _) | (_, Err(error)) => return Err(error),
-        };
-        if let [one, other] = &mut around[..] {
-            let margin_px = other.mean_cost_px - one.mean_cost_px;
-            (one.margin_px, other.margin_px) = (Some(margin_px), Some(-margin_px));
-        }
+        let around = matcher.match_closed(&points1, &points2, rig)?;
         let seam = seam(&points1, &points2, &around, matcher.params.tangency.window_px, rig)?;
         Ok(around.into_iter().map(|matched| Self::at(seam, curves, stride, matched)).collect())
     }

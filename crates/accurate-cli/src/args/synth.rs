@@ -90,6 +90,8 @@ pub struct XrayArgs {
 pub enum XrayGenerator {
     /// The randomised domain that networks are trained on.
     Training,
+    /// Mostly pictures of pairs, half of them of C-arms: what a trained network goes on with.
+    Pairs,
     /// Another background, wire, blur and noise.
     HeldOut,
     /// Wires in a transparent vessel phantom.

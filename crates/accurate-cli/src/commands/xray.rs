@@ -26,7 +26,11 @@ const PER_ROW: usize = 4;
 
 /// `accurate synth xray`: shards to train on, a sheet to look at.
 pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
-    let domain = XrayDomain { side_px: args.size, ..XrayDomain::default() };
+    let domain = match args.generator {
+        XrayGenerator::Pairs => XrayDomain::of_pairs(),
+        _ => XrayDomain::default(),
+    };
+    let domain = XrayDomain { side_px: args.size, ..domain };
     domain.check()?;
     if args.first.checked_add(args.count).is_none() {
         return Err(Failure::new(Failure::USAGE, "--first plus --count is too large"));
@@ -34,10 +38,10 @@ pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
     let backgrounds: Vec<_> =
         args.onto.iter().map(|path| middle_of(path, args.size)).collect::<Result<_, _>>()?;
     let draw = |index: u64| match (args.generator, backgrounds.len() as u64) {
-        (XrayGenerator::Training, 0) => draw_xray(&domain, args.seed, index),
+        (XrayGenerator::Training | XrayGenerator::Pairs, 0) => draw_xray(&domain, args.seed, index),
         (XrayGenerator::HeldOut, _) => draw_xray_held_out(args.size, args.seed, index),
         (XrayGenerator::Phantom, _) => draw_xray_phantom(args.size, args.seed, index),
-        (XrayGenerator::Training, files) => {
+        (XrayGenerator::Training | XrayGenerator::Pairs, files) => {
             draw_xray_onto(&domain, &backgrounds[(index % files) as usize], args.seed, index)
         }
     };
@@ -79,6 +83,7 @@ fn generator_name(args: &XrayArgs) -> Result<String, Failure> {
     if args.onto.is_empty() {
         return Ok(match args.generator {
             XrayGenerator::Training => "xray".to_owned(),
+            XrayGenerator::Pairs => "xray-pairs".to_owned(),
             XrayGenerator::HeldOut => "xray-held-out".to_owned(),
             XrayGenerator::Phantom => "xray-phantom".to_owned(),
         });

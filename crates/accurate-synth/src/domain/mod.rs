@@ -29,9 +29,9 @@ pub use held_out::draw_xray_held_out;
 pub use label::{TUBE_RADIUS_PX, VisiblePiece};
 pub use phantom::draw_xray_phantom;
 
-use crate::SynthError;
 use crate::options::within;
 use crate::rng::named_rng;
+use crate::{Family, SynthError};
 use aperture::Aperture;
 use detector::{Exposure, draw_exposure};
 use target::Target;
@@ -40,7 +40,8 @@ use wander::log_uniform;
 /// Changes whenever [`draw_xray`] gives other images for the same arguments.
 pub const XRAY_VERSION: u32 = 3;
 
-/// Ranges that an image is drawn from. The default is what the shipped network is trained on.
+/// Ranges that an image is drawn from. The default is what the shipped network was trained on first,
+/// [`XrayDomain::of_pairs`] what it went on with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct XrayDomain {
     /// Width and height of the image, px, 64 to 4096.
@@ -80,9 +81,25 @@ pub struct XrayDomain {
     /// Probability of an image without a wire, 0 to 1.
     pub empty_probability: f64,
     /// Probability of the picture of one view of a generated pair (`sim-paper`, `carm`, ...)
-    /// instead, 0 to 1. Of the other fields only `side_px` concerns it.
+    /// instead, 0 to 1. Of the other fields only `side_px` and those below concern it.
     pub pair_probability: f64,
+    /// Families of those pairs, at least one, drawn alike; one that is named twice, twice as often.
+    pub pair_families: Vec<Family>,
+    /// Width of the wire in such a picture, px, drawn uniform in its logarithm; within 1 to 64.
+    pub pair_width_px: RangeInclusive<f64>,
 }
+
+/// Families of pictures of pairs: the arms of the table count twice.
+const PAIR_FAMILIES: [Family; 8] = [
+    Family::SimPaper,
+    Family::SimPaper,
+    Family::Carm,
+    Family::Carm,
+    Family::Easy,
+    Family::Medium,
+    Family::Hard,
+    Family::Helix,
+];
 
 impl Default for XrayDomain {
     fn default() -> Self {
@@ -104,18 +121,40 @@ impl Default for XrayDomain {
             overlay_probability: 0.25,
             empty_probability: 0.03,
             pair_probability: 0.25,
+            pair_families: PAIR_FAMILIES.to_vec(),
+            pair_width_px: 1.0..=8.0,
         }
     }
 }
 
 impl XrayDomain {
+    /// Mostly pictures of pairs, half of them of C-arms, with wires of 1 to 5 px: what a network that
+    /// knows the default domain goes on with (docs/training.md).
+    pub fn of_pairs() -> Self {
+        let more = [Family::Carm; 4];
+        Self {
+            pair_probability: 0.7,
+            pair_families: more.into_iter().chain(PAIR_FAMILIES).collect(),
+            pair_width_px: 1.0..=5.0,
+            ..Self::default()
+        }
+    }
+
     /// Refuses ranges outside the documented limits.
     ///
     /// # Errors
     /// [`SynthError::BadOption`].
     pub fn check(&self) -> Result<(), SynthError> {
         check_side(self.side_px)?;
-        span("width_px", &self.width_px, 1.0..=64.0, "low..=high within 1 to 64 px")?;
+        for (name, width_px) in
+            [("width_px", &self.width_px), ("pair_width_px", &self.pair_width_px)]
+        {
+            span(name, width_px, 1.0..=64.0, "low..=high within 1 to 64 px")?;
+        }
+        if self.pair_families.is_empty() {
+            let (name, value) = ("pair_families", "none".to_owned());
+            return Err(SynthError::BadOption { name, value, expected: "at least one family" });
+        }
         span("wire_depth", &self.wire_depth, 0.01..=10.0, "low..=high within 0.01 to 10")?;
         let dose = &self.dose_photons_per_px;
         span("dose_photons_per_px", dose, 1.0..=1e6, "low..=high within 1 to 1e6")?;
@@ -206,7 +245,7 @@ pub fn draw_xray(domain: &XrayDomain, seed: u64, index: u64) -> Result<XraySampl
     let side = domain.side_px as usize;
     let mut pair = stream("pair");
     if pair.random_bool(domain.pair_probability)
-        && let Some(sample) = of_pair::draw(&mut pair, domain.side_px, seed, index)
+        && let Some(sample) = of_pair::draw(&mut pair, domain, seed, index)
     {
         return Ok(sample);
     }

@@ -4,22 +4,10 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::wander::log_uniform;
-use super::{XraySample, in_image, label};
+use super::{XrayDomain, XraySample, in_image, label};
 use crate::projection::Projection;
 use crate::xray::{XrayOptions, XrayResponse, render_xray_of_view};
-use crate::{CaseOptions, Family, generate};
-
-/// Families, in the shares in which they are drawn: the arms of the table count twice.
-const FAMILIES: [Family; 8] = [
-    Family::SimPaper,
-    Family::SimPaper,
-    Family::Carm,
-    Family::Carm,
-    Family::Easy,
-    Family::Medium,
-    Family::Hard,
-    Family::Helix,
-];
+use crate::{CaseOptions, generate};
 
 /// One view of a generated pair as its X-ray picture shows it, with width, dose, contrast, blur,
 /// background and window drawn anew: a square of `side` px about a point of the wire. The wire's
@@ -28,9 +16,15 @@ const FAMILIES: [Family; 8] = [
 ///
 /// Where the family's images are smaller than the square, their last rows and columns go on.
 /// `None` only if no case can be drawn (not known to happen).
-pub(crate) fn draw(rng: &mut ChaCha8Rng, side: u32, seed: u64, index: u64) -> Option<XraySample> {
-    let family = FAMILIES[rng.random_range(0..FAMILIES.len())];
-    let width_px = log_uniform(rng, 1.0, 8.0);
+pub(crate) fn draw(
+    rng: &mut ChaCha8Rng,
+    domain: &XrayDomain,
+    seed: u64,
+    index: u64,
+) -> Option<XraySample> {
+    let side = domain.side_px;
+    let family = domain.pair_families[rng.random_range(0..domain.pair_families.len())];
+    let width_px = log_uniform(rng, *domain.pair_width_px.start(), *domain.pair_width_px.end());
     let own = generate(family, seed, index, &CaseOptions::default()).ok()?;
     let wide = CaseOptions { mask_thickness_px: Some(width_px), ..CaseOptions::default() };
     let mut case = generate(family, seed, index, &wide).ok()?;
