@@ -106,8 +106,9 @@ pub struct FreeMatch {
     /// Cost of the path with all prices per point of either curve, px: 0 for a perfect match, at most
     /// about [`MovePrices::end_skip`].
     pub mean_cost_px: f64,
-    /// By how much `mean_cost_px` of the other direction is higher: the confidence in `reversed`.
-    /// Infinite if the other direction is impossible, `None` if it was not asked for.
+    /// By how much `mean_cost_px` of the other direction is higher: the confidence in `reversed`;
+    /// below 0 if it is lower ([`FreeMatcher::match_closed`] gives both). Infinite if the other
+    /// direction is impossible, `None` if it was not asked for.
     pub margin_px: Option<f64>,
     /// Mean distance in view 1, px, of matched points to the epipolar lines of their partners,
     /// before they were moved to the exact crossings: how well the curves agree. (After that,
@@ -177,7 +178,9 @@ impl FreeMatcher {
         let mut around = match (around(false), around(true)) {
             (Ok(given), Ok(backwards)) => vec![given, backwards],
             (Ok(only), Err(MatchError::NoFinitePath { .. }))
-            | (Err(MatchError::NoFinitePath { .. }), Ok(only)) => vec![only],
+            | (Err(MatchError::NoFinitePath { .. }), Ok(only)) => {
+                vec![FreeMatch { margin_px: Some(f64::INFINITY), ..only }]
+            }
             (Err(error), _) | (_, Err(error)) => return Err(error),
         };
         if let [given, backwards] = &mut around[..] {
