@@ -175,19 +175,14 @@ impl FreeMatcher {
     ) -> Result<Vec<FreeMatch>, MatchError> {
         let around =
             |reversed| self.finish(self.closed(curve1, curve2, reversed, rig)?, curve2, rig, None);
-        let mut around = match (around(false), around(true)) {
-            (Ok(given), Ok(backwards)) => vec![given, backwards],
-            (Ok(only), Err(MatchError::NoFinitePath { .. }))
-            | (Err(MatchError::NoFinitePath { .. }), Ok(only)) => {
-                vec![FreeMatch { margin_px: Some(f64::INFINITY), ..only }]
-            }
-            (Err(error), _) | (_, Err(error)) => return Err(error),
+        let (mut one, other) = possible(around(false), around(true))?;
+        let Some(mut other) = other else {
+            one.margin_px = Some(f64::INFINITY);
+            return Ok(vec![one]);
         };
-        if let [given, backwards] = &mut around[..] {
-            let margin_px = backwards.mean_cost_px - given.mean_cost_px;
-            (given.margin_px, backwards.margin_px) = (Some(margin_px), Some(-margin_px));
-        }
-        Ok(around)
+        let margin_px = other.mean_cost_px - one.mean_cost_px;
+        (one.margin_px, other.margin_px) = (Some(margin_px), Some(-margin_px));
+        Ok(vec![one, other])
     }
 
     fn open(
@@ -386,17 +381,29 @@ fn better(
     forwards: Result<Candidate, MatchError>,
     backwards: Result<Candidate, MatchError>,
 ) -> Result<(Candidate, f64), MatchError> {
+    let (one, other) = possible(forwards, backwards)?;
+    Ok(match other {
+        None => (one, f64::INFINITY),
+        Some(other) if other.mean_cost_px < one.mean_cost_px => {
+            let margin = one.mean_cost_px - other.mean_cost_px;
+            (other, margin)
+        }
+        Some(other) => {
+            let margin = other.mean_cost_px - one.mean_cost_px;
+            (one, margin)
+        }
+    })
+}
+
+/// What was found in both directions, or in the only one that has a path.
+fn possible<T>(
+    forwards: Result<T, MatchError>,
+    backwards: Result<T, MatchError>,
+) -> Result<(T, Option<T>), MatchError> {
     match (forwards, backwards) {
-        (Ok(a), Ok(b)) if b.mean_cost_px < a.mean_cost_px => {
-            let margin = a.mean_cost_px - b.mean_cost_px;
-            Ok((b, margin))
-        }
-        (Ok(a), Ok(b)) => {
-            let margin = b.mean_cost_px - a.mean_cost_px;
-            Ok((a, margin))
-        }
+        (Ok(one), Ok(other)) => Ok((one, Some(other))),
         (Ok(only), Err(MatchError::NoFinitePath { .. }))
-        | (Err(MatchError::NoFinitePath { .. }), Ok(only)) => Ok((only, f64::INFINITY)),
+        | (Err(MatchError::NoFinitePath { .. }), Ok(only)) => Ok((only, None)),
         (Err(error), _) | (_, Err(error)) => Err(error),
     }
 }
