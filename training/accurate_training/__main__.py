@@ -117,7 +117,10 @@ def _plot(options: argparse.Namespace) -> None:
 def _card(options: argparse.Namespace) -> None:
     from .card import write_card
 
-    write_card(options.output, options.model, runs=options.run, shards=options.shards, scores=options.scores)
+    write_card(
+        options.output, options.model, run=options.run, shards=options.shards,
+        went_on_from=options.went_on_from, scores=options.scores,
+    )
 
 
 def _fixture(options: argparse.Namespace) -> None:
@@ -131,7 +134,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True)
 
     train = commands.add_parser("train", help="train, or resume the run of a folder")
-    train.add_argument("--shards", type=Path, required=True, help="folder of training shards")
+    train.add_argument("--shards", type=Path, nargs="+", required=True, help="folders of training shards")
     train.add_argument("--validation", type=Path, help="folder of validation shards")
     train.add_argument("--run", type=Path, required=True, help="folder of the run; resumed if it has a checkpoint")
     train.add_argument("--init-from", type=Path, help="checkpoint or ONNX file whose weights start a new run")
@@ -188,8 +191,9 @@ def _parser() -> argparse.ArgumentParser:
     card = commands.add_parser("card", help="write the card of an exported network")
     card.add_argument("model", type=Path)
     card.add_argument("output", type=Path)
-    card.add_argument("--run", type=Path, nargs="+", required=True, help="runs that led to it, in order")
-    card.add_argument("--shards", type=Path, required=True, help="folder of the last run's shards")
+    card.add_argument("--run", type=Path, required=True, help="its last run")
+    card.add_argument("--shards", type=Path, nargs="+", required=True, help="folders of that run's shards")
+    card.add_argument("--went-on-from", type=Path, help="card of the network that the run started from")
     card.add_argument("--scores", type=Path, help="JSON of `evaluate`")
     card.set_defaults(run_command=_card)
 

@@ -46,7 +46,7 @@ def run_ablation(
     for name in arms:
         config = ablation_config(ARMS[name], width=width, steps=steps, crop_px=crop_px)
         run = folder / folder_name(name)
-        reached = Trainer(config, shards=shards, run=run).train()
+        reached = Trainer(config, shards=[shards], run=run).train()
         if reached < steps:
             raise TrainingError(f"{run}: stopped at step {reached} of {steps}; the same command goes on")
         results[name] = score_method(checkpoint_segmenter(run / CHECKPOINT), images, masks)

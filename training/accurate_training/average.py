@@ -1,13 +1,18 @@
 """Between two networks of one course of training: what the later one learnt, with less forgotten."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import onnx
-from onnx import numpy_helper
+from blake3 import blake3
+from onnx import helper, numpy_helper
 
 from .atomic import write_atomically
 from .import_weights import WeightError
+
+#: Metadata entry: what was averaged, as JSON (`of`: BLAKE3 of both files; `weights`).
+AVERAGE_KEY = "accurate.average"
 
 
 def average_weights(before: Path, after: Path, share: float, output: Path) -> None:
@@ -28,4 +33,8 @@ def average_weights(before: Path, after: Path, share: float, output: Path) -> No
         if np.issubdtype(new.dtype, np.floating):
             mean = (1.0 - share) * old.astype(np.float32) + share * new.astype(np.float32)
             initializer.CopyFrom(numpy_helper.from_array(mean.astype(new.dtype), initializer.name))
+    files = [blake3(path.read_bytes()).hexdigest() for path in (before, after)]
+    metadata = {entry.key: entry.value for entry in second.metadata_props}
+    metadata[AVERAGE_KEY] = json.dumps({"of": files, "weights": [1.0 - share, share]})
+    helper.set_model_props(second, metadata)
     write_atomically(output, lambda temporary: onnx.save(second, temporary))

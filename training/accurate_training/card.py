@@ -1,13 +1,17 @@
 """The card of a shipped network: where it comes from, what it reaches, its hash."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
+import onnx
 from blake3 import blake3
 
 from .atomic import write_atomically
+from .average import AVERAGE_KEY
 from .checkpoint import Checkpoint
 from .configuration import TEST_SEED, TRAINING_SEED, VALIDATION_SEED
+from .export import STEPS_KEY
 from .network import build_network, parameter_count, stage_features
 from .trainer import CHECKPOINT
 
@@ -16,15 +20,34 @@ SHARDS_MANIFEST = "shards.json"
 LICENCE = "MIT OR Apache-2.0"
 
 
-def write_card(output: Path, model: Path, *, runs: list[Path], shards: Path, scores: Path | None) -> None:
-    """Writes the card of `model` as JSON, from the checkpoints of its runs and the scores of `evaluate`."""
-    checkpoints = [Checkpoint.load(run / CHECKPOINT) for run in runs]
-    if not checkpoints:
-        raise ValueError("a card needs the run that made the network")
-    width = checkpoints[-1].config.width
-    manifest = shards / SHARDS_MANIFEST
-    generator = json.loads(manifest.read_text()) if manifest.exists() else {}
-    generator.pop("shards", None)
+def write_card(
+    output: Path,
+    model: Path,
+    *,
+    run: Path,
+    shards: Sequence[Path],
+    went_on_from: Path | None,
+    scores: Path | None,
+) -> None:
+    """Writes the card of `model` as JSON.
+
+    From the checkpoint of its last `run` and the folders of `shards` that it drew from, the card of the
+    network that it `went_on_from` (whose runs come first), and the scores of `evaluate`. An average of
+    networks is known by its metadata.
+    """
+    checkpoint = Checkpoint.load(run / CHECKPOINT)
+    width = checkpoint.config.width
+    earlier = json.loads(went_on_from.read_text())["runs"] if went_on_from is not None else []
+    last = {
+        "name": run.name,
+        "steps": checkpoint.step,
+        "images": max(checkpoint.pool_at.values(), default=0),
+        "generators": [_generator(folder) for folder in shards],
+        "settings": checkpoint.config.to_dict(),
+    }
+    metadata = {entry.key: entry.value for entry in onnx.load(model).metadata_props}
+    if AVERAGE_KEY in metadata:
+        last["average"] = json.loads(metadata[AVERAGE_KEY])
     data = model.read_bytes()
     card = {
         "file": model.name,
@@ -37,15 +60,23 @@ def write_card(output: Path, model: Path, *, runs: list[Path], shards: Path, sco
             "parameters": parameter_count(build_network(width, 0)),
         },
         "seeds": {"training": TRAINING_SEED, "validation": VALIDATION_SEED, "test": TEST_SEED},
-        "generator": generator,
-        "runs": [
-            {"name": run.name, "steps": checkpoint.step, "images": max(checkpoint.pool_at.values(), default=0),
-             "settings": checkpoint.config.to_dict()}
-            for run, checkpoint in zip(runs, checkpoints, strict=True)
-        ],
+        "runs": [*earlier, last],
         "scores": _summaries(scores) if scores is not None else None,
     }
+    steps = sum(each["steps"] for each in card["runs"])
+    if metadata.get(STEPS_KEY) != str(steps):
+        raise ValueError(f"{model} says {metadata.get(STEPS_KEY)} steps, its runs make {steps}")
     write_atomically(output, lambda temporary: temporary.write_text(json.dumps(card, indent=1) + "\n"))
+
+
+def _generator(shards: Path) -> dict:
+    """What made a folder of shards, if its generator wrote it down."""
+    manifest = shards / SHARDS_MANIFEST
+    if not manifest.exists():
+        return {}
+    described = json.loads(manifest.read_text())
+    described.pop("shards", None)
+    return described
 
 
 def _summaries(scores: Path) -> dict:

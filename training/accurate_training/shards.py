@@ -27,29 +27,30 @@ class Case:
 
 
 class ShardPool:
-    """The images of the shards of one folder, in the order of their file names.
+    """The images of the shards of one or several folders, folder after folder, in the order of their file names.
 
-    Shards are only ever appended: the index of an image never changes while a pool lives.
+    Shards are only ever appended, to the last folder: the index of an image never changes while a pool lives.
     """
 
-    def __init__(self, folder: Path):
-        self.folder = Path(folder)
-        self._names: list[str] = []
+    def __init__(self, *folders: Path):
+        self.folders = tuple(Path(folder) for folder in folders)
+        self._paths: list[Path] = []
         self._arrays: list[np.ndarray] = []
         self._ends: list[int] = []
-        if not self.folder.is_dir():
-            raise ShardError(f"{self.folder}: no such folder of shards")
+        for folder in self.folders:
+            if not folder.is_dir():
+                raise ShardError(f"{folder}: no such folder of shards")
+            if not any(folder.glob(PATTERN)):
+                raise ShardError(f"{folder}: no {PATTERN} in it")
         self.refresh()
-        if not self._names:
-            raise ShardError(f"{self.folder}: no {PATTERN} in it")
 
     def __len__(self) -> int:
         return self._ends[-1] if self._ends else 0
 
     @property
     def names(self) -> tuple[str, ...]:
-        """File names of the shards, in order."""
-        return tuple(self._names)
+        """Folder and file name of the shards, in order."""
+        return tuple(f"{path.parent.name}/{path.name}" for path in self._paths)
 
     @property
     def sides(self) -> tuple[int, int]:
@@ -60,17 +61,17 @@ class ShardPool:
         """Takes in shards that have appeared; the number of images.
 
         # Errors
-        `ShardError` if a new name sorts before a known one, or if a shard is malformed.
+        `ShardError` if a shard appeared before a known one, or if a shard is malformed.
         """
-        for path in sorted(self.folder.glob(PATTERN)):
-            if path.name in self._names:
-                continue
-            if self._names and path.name < self._names[-1]:
-                raise ShardError(f"{path}: appeared after {self._names[-1]}, which would renumber images")
+        present = [path for folder in self.folders for path in sorted(folder.glob(PATTERN))]
+        for known, path in zip(self._paths, present, strict=False):
+            if path != known:
+                raise ShardError(f"{path}: stands where {known} stood, which would renumber images")
+        for path in present[len(self._paths) :]:
             array = _open_shard(path)
             if self._arrays and array.shape[2:] != self.sides:
                 raise ShardError(f"{path}: images of {array.shape[2:]}, the others have {self.sides}")
-            self._names.append(path.name)
+            self._paths.append(path)
             self._arrays.append(array)
             self._ends.append(len(self) + array.shape[0])
         return len(self)
@@ -78,14 +79,14 @@ class ShardPool:
     def case(self, index: int) -> Case:
         """Image number `index` (views of the mapped file, not copies)."""
         if not 0 <= index < len(self):
-            raise ShardError(f"{self.folder}: image {index} of {len(self)}")
+            raise ShardError(f"image {index} of {len(self)} in {', '.join(map(str, self.folders))}")
         shard = int(np.searchsorted(self._ends, index, side="right"))
         first = self._ends[shard] - self._arrays[shard].shape[0]
         planes = self._arrays[shard][index - first]
         for plane, what in ((MASK, "mask"), (TUBE, "tubed skeleton")):
             if planes[plane].max() > 1:
                 raise ShardError(
-                    f"{self.folder / self._names[shard]}: {what} of image {index - first} has the value "
+                    f"{self._paths[shard]}: {what} of image {index - first} has the value "
                     f"{planes[plane].max()}, not only 0 and 1"
                 )
         return Case(planes[IMAGE], planes[MASK], planes[TUBE])

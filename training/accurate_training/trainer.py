@@ -3,6 +3,7 @@
 import signal
 import sys
 import time
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -39,14 +40,15 @@ class Trainer:
         self,
         config: TrainConfig,
         *,
-        shards: Path,
+        shards: Sequence[Path],
         run: Path,
         validation: Path | None = None,
         init_from: Path | None = None,
     ):
-        """`init_from` is a checkpoint or an exported network whose weights (only those) start a new run."""
+        """`shards` are folders whose images are drawn alike. `init_from` is a checkpoint or an exported network
+        whose weights (only those) start a new run."""
         self.config, self.run_folder = config, Path(run)
-        self.pool = ShardPool(shards)
+        self.pool = ShardPool(*shards)
         self.validation = _validation_cases(validation, config.validation_images)
         self.network = build_network(config.width, config.seed)
         self.step, self.pool_at, self.inherited_steps = 0, {}, 0
@@ -187,8 +189,8 @@ class Trainer:
         present = self.pool.names[: len(checkpoint.pool_names)]
         if list(present) != checkpoint.pool_names:
             raise ShardError(
-                f"{self.pool.folder}: the run has drawn from {len(checkpoint.pool_names)} shards, "
-                f"and they are no longer the first ones there"
+                f"the run has drawn from {len(checkpoint.pool_names)} shards, and they are no longer "
+                f"the first ones in {', '.join(map(str, self.pool.folders))}"
             )
         self.network.load_state_dict(checkpoint.network)
         self.optimizer.load_state_dict(checkpoint.optimizer)

@@ -91,11 +91,11 @@ def test_a_weight_beyond_float16_is_refused_and_leaves_no_file(tmp_path):
 
 
 def test_shipped_weights_start_a_new_run(shards, tmp_path):
-    Trainer(CONFIG, shards=shards, run=tmp_path / "first").train(until=2)
+    Trainer(CONFIG, shards=[shards], run=tmp_path / "first").train(until=2)
     for form, flags in (("full", ["--full-weights"]), ("half", [])):
         out = tmp_path / f"{form}.onnx"
         assert main(["export", str(tmp_path / "first" / CHECKPOINT), str(out), *flags]) == 0
-        second = Trainer(CONFIG, shards=shards, run=tmp_path / form, init_from=out)
+        second = Trainer(CONFIG, shards=[shards], run=tmp_path / form, init_from=out)
         assert second.step == 0 and second.inherited_steps == 2
         weights = dict(second.network.named_parameters())
         first = Checkpoint.load(tmp_path / "first" / CHECKPOINT).network

@@ -47,9 +47,9 @@ def losses(run: Path) -> list[dict]:
 @pytest.mark.parametrize("bfloat16", [True, False])
 def test_three_steps_and_three_more_are_six_steps(shards, tmp_path, bfloat16):
     config = replace(CONFIG, bfloat16=bfloat16)
-    Trainer(config, shards=shards, validation=shards, run=tmp_path / "whole").train()
-    assert Trainer(config, shards=shards, validation=shards, run=tmp_path / "cut").train(until=3) == 3
-    assert Trainer(config, shards=shards, validation=shards, run=tmp_path / "cut").train() == 6
+    Trainer(config, shards=[shards], validation=shards, run=tmp_path / "whole").train()
+    assert Trainer(config, shards=[shards], validation=shards, run=tmp_path / "cut").train(until=3) == 3
+    assert Trainer(config, shards=[shards], validation=shards, run=tmp_path / "cut").train() == 6
     whole, cut = (Checkpoint.load(tmp_path / name / CHECKPOINT) for name in ("whole", "cut"))
     assert whole.step == 6 and same(whole, cut)
     assert losses(tmp_path / "whole") == losses(tmp_path / "cut")
@@ -58,65 +58,65 @@ def test_three_steps_and_three_more_are_six_steps(shards, tmp_path, bfloat16):
 
 
 def test_another_seed_is_another_run(shards, tmp_path):
-    Trainer(CONFIG, shards=shards, run=tmp_path / "a").train(until=1)
-    Trainer(replace(CONFIG, seed=2), shards=shards, run=tmp_path / "b").train(until=1)
+    Trainer(CONFIG, shards=[shards], run=tmp_path / "a").train(until=1)
+    Trainer(replace(CONFIG, seed=2), shards=[shards], run=tmp_path / "b").train(until=1)
     assert not same(*(Checkpoint.load(tmp_path / name / CHECKPOINT) for name in "ab"))
 
 
 def test_steps_after_the_checkpoint_are_repeated_not_doubled(shards, tmp_path):
-    trainer = Trainer(CONFIG, shards=shards, run=tmp_path / "run")
+    trainer = Trainer(CONFIG, shards=[shards], run=tmp_path / "run")
     trainer.train(until=2)
     early = (tmp_path / "run" / CHECKPOINT).read_bytes()
     trainer.train(until=4)
     whole = losses(tmp_path / "run")
     # A crash between two checkpoints: the curve is ahead of the state.
     (tmp_path / "run" / CHECKPOINT).write_bytes(early)
-    Trainer(CONFIG, shards=shards, run=tmp_path / "run").train(until=4)
+    Trainer(CONFIG, shards=[shards], run=tmp_path / "run").train(until=4)
     assert losses(tmp_path / "run") == whole
 
 
 def test_new_shards_are_drawn_from_and_resuming_remembers_when(tmp_path):
     folder = tmp_path / "shards"
     write_shard(folder, 0, count=2, side=272)
-    trainer = Trainer(CONFIG, shards=folder, run=tmp_path / "run")
+    trainer = Trainer(CONFIG, shards=[folder], run=tmp_path / "run")
     trainer.train(until=2)
     write_shard(folder, 1, count=3, side=272)
     trainer.train(until=5)
     assert [row["images"] for row in losses(tmp_path / "run")] == [2, 2, 5, 5, 5]
     write_shard(folder, 2, count=1, side=272)
-    Trainer(CONFIG, shards=folder, run=tmp_path / "run").train()
+    Trainer(CONFIG, shards=[folder], run=tmp_path / "run").train()
     # Step 5 shares a block of two steps with step 4, which was drawn from five images.
     assert losses(tmp_path / "run")[5]["images"] == 5
 
 
 def test_a_run_whose_shards_are_gone_is_refused(shards, tmp_path):
-    Trainer(CONFIG, shards=shards, run=tmp_path / "run").train(until=1)
+    Trainer(CONFIG, shards=[shards], run=tmp_path / "run").train(until=1)
     (shards / "shard-000000.npy").rename(shards / "shard-000009.npy")
     with pytest.raises(ShardError, match="no longer the first"):
-        Trainer(CONFIG, shards=shards, run=tmp_path / "run")
+        Trainer(CONFIG, shards=[shards], run=tmp_path / "run")
 
 
 def test_a_run_with_other_settings_is_refused(shards, tmp_path):
-    Trainer(CONFIG, shards=shards, run=tmp_path / "run").train(until=1)
+    Trainer(CONFIG, shards=[shards], run=tmp_path / "run").train(until=1)
     with pytest.raises(CheckpointError, match="learning_rate: 0.002 there, 0.5 here"):
-        Trainer(replace(CONFIG, learning_rate=0.5), shards=shards, run=tmp_path / "run")
+        Trainer(replace(CONFIG, learning_rate=0.5), shards=[shards], run=tmp_path / "run")
 
 
 def test_a_torn_checkpoint_is_refused(shards, tmp_path):
-    Trainer(CONFIG, shards=shards, run=tmp_path / "run").train(until=1)
+    Trainer(CONFIG, shards=[shards], run=tmp_path / "run").train(until=1)
     path = tmp_path / "run" / CHECKPOINT
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(CheckpointError, match="not a checkpoint"):
-        Trainer(CONFIG, shards=shards, run=tmp_path / "run")
+        Trainer(CONFIG, shards=[shards], run=tmp_path / "run")
 
 
 def test_initial_weights_come_from_another_run(shards, tmp_path):
-    Trainer(CONFIG, shards=shards, run=tmp_path / "first").train(until=2)
+    Trainer(CONFIG, shards=[shards], run=tmp_path / "first").train(until=2)
     first = Checkpoint.load(tmp_path / "first" / CHECKPOINT)
-    second = Trainer(CONFIG, shards=shards, run=tmp_path / "second", init_from=tmp_path / "first" / CHECKPOINT)
+    second = Trainer(CONFIG, shards=[shards], run=tmp_path / "second", init_from=tmp_path / "first" / CHECKPOINT)
     assert second.step == 0 and second.inherited_steps == 2
     assert all(torch.equal(second.network.state_dict()[name], value) for name, value in first.network.items())
     with pytest.raises(CheckpointError, match="width 2 do not fit width 3"):
         Trainer(
-            replace(CONFIG, width=3), shards=shards, run=tmp_path / "third", init_from=tmp_path / "first" / CHECKPOINT
+            replace(CONFIG, width=3), shards=[shards], run=tmp_path / "third", init_from=tmp_path / "first" / CHECKPOINT
         )
