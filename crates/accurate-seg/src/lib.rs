@@ -42,6 +42,7 @@ mod ridge;
 mod segmentation;
 mod skeleton;
 mod spurs;
+mod strands;
 mod thin;
 mod thin_rules;
 #[cfg(test)]
@@ -57,5 +58,6 @@ pub use post_processing::PostProcessing;
 pub use ridge::{RidgeParams, RidgePoint, median_ridge_width_px, ridge_centreline};
 pub use segmentation::{Progress, Segmentation, Segmenter, Watch, unwatched};
 pub use skeleton::Skeleton;
+pub use strands::Strands;
 pub use thin::{guo_hall, zhang_suen};
 pub use threshold::{binarise_fixed, binarise_hysteresis, binarise_otsu, otsu_level};

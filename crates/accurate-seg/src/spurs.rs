@@ -95,7 +95,7 @@ fn distance(a: (usize, usize), b: (usize, usize)) -> f64 {
 }
 
 /// For each pixel of the mask the seed it is reached from first, breadth first.
-fn nearest_seed(mask: &Mask, seeds: &[(usize, usize)]) -> Vec<Option<(usize, usize)>> {
+pub(crate) fn nearest_seed(mask: &Mask, seeds: &[(usize, usize)]) -> Vec<Option<(usize, usize)>> {
     let width = mask.width();
     let mut nearest = vec![None; mask.height() * width];
     let mut open: VecDeque<(usize, usize)> = seeds.iter().copied().collect();
