@@ -8,10 +8,13 @@ use crate::Error;
 const PLANE_DISTANCE_PX: f64 = 1.5;
 /// A piece is a stray if so much of it disagrees with the other view, and ceases to without it.
 const DISAGREEING: f64 = 0.5;
-/// A piece whose median logit is this far below that of the surest piece of its view is a stray. On
+/// A piece whose median logit is this far below that of the surest long piece of its view is a stray. On
 /// ten generated pairs (`carm`, seed 1, whose backgrounds show vessels) most pieces of vessels lay
 /// farther below the wire than that; a few did not, and are left to the other view.
 const FAINTER: f64 = 2.0;
+/// Of pieces at least this long, as part of the longest: where a wire lies upon itself it is darkest,
+/// and what is a small loop of it says little about the rest.
+const LONG_PIECE: f64 = 0.25;
 /// A strand of a piece is a stray only if its median logit is this far below that of the surest strand
 /// of its view, and the other view shows nothing at all along so much of it ([`ALONE`]): strands of a
 /// body that lie one upon the other in one view face more strands in the other, but not none. Of 378
@@ -134,8 +137,9 @@ impl Parts {
         let skeleton = Skeleton::of(mask)?;
         let components = Components::of(mask)?;
         let labels = components.labels().clone();
-        let (_, logits) = surety(&skeleton, &labels, components.sizes().len(), map);
-        let surest = logits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (lengths, logits) = surety(&skeleton, &labels, components.sizes().len(), map);
+        let longest = lengths.iter().copied().max().unwrap_or(0) as f64;
+        let surest = surest(&logits, &lengths, LONG_PIECE * longest);
         let kept = logits.iter().map(|logit| *logit >= surest - FAINTER).collect();
         let doubtful = vec![true; logits.len()];
         Ok(Self { labels, skeleton, kept, doubtful, alone: 0.0 })
@@ -146,8 +150,7 @@ impl Parts {
         let strands = Strands::of(mask)?;
         let (labels, skeleton) = (strands.labels().clone(), strands.skeleton().clone());
         let (lengths, logits) = surety(&skeleton, &labels, strands.count(), map);
-        let long = || logits.iter().zip(&lengths).filter(|(_, length)| **length >= STRAND_PX);
-        let surest = long().map(|(logit, _)| *logit).fold(f64::NEG_INFINITY, f64::max);
+        let surest = surest(&logits, &lengths, STRAND_PX as f64);
         let doubtful = logits
             .iter()
             .zip(&lengths)
@@ -180,6 +183,12 @@ impl Parts {
             *set &= *piece > 0 && held[*piece as usize - 1];
         });
     }
+}
+
+/// The greatest logit of the parts that are long enough.
+fn surest(logits: &[f64], lengths: &[usize], least_px: f64) -> f64 {
+    let long = logits.iter().zip(lengths).filter(|(_, length)| **length as f64 >= least_px);
+    long.map(|(logit, _)| *logit).fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Skeleton pixels of each part, and the median of their logits.
@@ -296,6 +305,19 @@ mod tests {
     /// Maps that are equally sure of every pixel of the masks.
     fn sure(masks: &[Array2<bool>; 2]) -> [Array2<f32>; 2] {
         masks.each_ref().map(|mask| mask.mapv(|set| if set { 0.99 } else { 0.01 }))
+    }
+
+    #[test]
+    fn a_small_dark_loop_does_not_make_strays_of_the_rest() {
+        let case = generate(Family::Medium, 1000, 0, &CaseOptions::default()).unwrap();
+        let mut masks = case.masks.clone();
+        let mut maps = sure(&masks);
+        let wire = masks[0].clone();
+        paint(&mut masks[0], (8.0, 8.0), (40.0, 30.0));
+        maps[0].zip_mut_with(&masks[0], |p, set| *p = if *set { 0.9999 } else { *p });
+        maps[0].zip_mut_with(&wire, |p, set| *p = if *set { 0.99 } else { *p });
+        let (kept, _) = without_strays(&masks, &maps, &case.rig, &case.id).unwrap();
+        assert!(kept[0].iter().zip(&wire).all(|(kept, wire)| *kept || !*wire));
     }
 
     #[test]
