@@ -95,6 +95,20 @@ def test_images_are_numbered_across_shards(tmp_path):
         pool.case(6)
 
 
+def test_several_folders_follow_one_another_and_only_the_last_may_grow(tmp_path):
+    first, second = tmp_path / "first", tmp_path / "second"
+    write_shard(first, 0, count=2, side=64)
+    write_shard(second, 0, count=3, side=64)
+    pool = ShardPool(first, second)
+    assert pool.names == ("first/shard-000000.npy", "second/shard-000000.npy")
+    assert np.array_equal(pool.case(2).image, np.load(second / "shard-000000.npy")[0, 0])
+    write_shard(second, 1, count=1, side=64)
+    assert pool.refresh() == 6
+    write_shard(first, 1, count=1, side=64)
+    with pytest.raises(ShardError, match="renumber"):
+        pool.refresh()
+
+
 @pytest.mark.parametrize(
     ("array", "message"),
     [
