@@ -6,7 +6,7 @@ use crate::Error;
 
 /// Distance of the epipolar planes at which strands are counted, px in the image.
 const PLANE_DISTANCE_PX: f64 = 1.5;
-/// A piece is a stray if so much of it disagrees with the other view, and ceases to without it.
+/// A piece or strand is a stray if so much of it disagrees with the other view, and ceases to without it.
 const DISAGREEING: f64 = 0.5;
 /// A piece whose median logit is this far below that of the surest long piece of its view is a stray. On
 /// ten generated pairs (`carm`, seed 1, whose backgrounds show vessels) most pieces of vessels lay
@@ -64,11 +64,11 @@ pub(crate) fn without_strays(
                 .map_err(refuse(number))
         };
         let (parts1, parts2) = (parts(0, View1::NUMBER)?, parts(1, View2::NUMBER)?);
-        let mut views = [Pieces::of(parts1, &at1), Pieces::of(parts2, &at2)];
+        let mut views = [PartSteps::of(parts1, &at1), PartSteps::of(parts2, &at2)];
         let planes = Planes::through(&views);
         let counts = views.each_ref().map(|view| view.crossings(&planes));
-        while let Some((view, piece)) = worst(&views, &counts, &planes) {
-            views[view].parts.kept[piece] = false;
+        while let Some((view, part)) = worst(&views, &counts, &planes) {
+            views[view].parts.kept[part] = false;
         }
         for (mask, view) in kept.iter_mut().zip(&views) {
             view.parts.cut(mask);
@@ -81,7 +81,7 @@ pub(crate) fn without_strays(
 
 /// The part that goes next: its view and number.
 fn worst(
-    views: &[Pieces; 2],
+    views: &[PartSteps; 2],
     counts: &[Vec<Vec<i32>>; 2],
     planes: &Planes,
 ) -> Option<(usize, usize)> {
@@ -211,14 +211,14 @@ fn surety(
 
 /// The parts of one mask as the epipolar planes see them: a step from pixel to pixel of a skeleton, as
 /// the angles of its ends.
-struct Pieces {
+struct PartSteps {
     parts: Parts,
     steps: Vec<Vec<(f64, f64)>>,
     /// Radians per px at every skeleton pixel.
     gradients: Vec<f64>,
 }
 
-impl Pieces {
+impl PartSteps {
     fn of(parts: Parts, angle: &dyn Fn(f64, f64) -> Option<(f64, f64)>) -> Self {
         let mut steps = vec![Vec::new(); parts.kept.len()];
         let mut gradients = Vec::new();
@@ -248,9 +248,9 @@ impl Pieces {
         Self { parts, steps, gradients }
     }
 
-    /// How often each plane cuts each piece.
+    /// How often each plane cuts each part.
     fn crossings(&self, planes: &Planes) -> Vec<Vec<i32>> {
-        let of_piece = |steps: &Vec<(f64, f64)>| {
+        let of_part = |steps: &Vec<(f64, f64)>| {
             let mut counts = vec![0; planes.count];
             for (low, high) in steps {
                 for count in &mut counts[planes.below(*low)..planes.below(*high)] {
@@ -259,7 +259,7 @@ impl Pieces {
             }
             counts
         };
-        self.steps.iter().map(of_piece).collect()
+        self.steps.iter().map(of_part).collect()
     }
 }
 
@@ -271,12 +271,12 @@ struct Planes {
 }
 
 impl Planes {
-    fn through(views: &[Pieces; 2]) -> Self {
+    fn through(views: &[PartSteps; 2]) -> Self {
         let steps = || views.iter().flat_map(|view| view.steps.iter().flatten());
         let first = steps().map(|(low, _)| *low).fold(f64::INFINITY, f64::min);
         let last = steps().map(|(_, high)| *high).fold(f64::NEG_INFINITY, f64::max);
         // The finer of the two images decides.
-        let typical = |view: &Pieces| median(&mut view.gradients.clone());
+        let typical = |view: &PartSteps| median(&mut view.gradients.clone());
         let step = PLANE_DISTANCE_PX * typical(&views[0]).min(typical(&views[1]));
         // One pixel alone has no step; no image has this many planes.
         let count = ((last - first) / step).ceil().clamp(0.0, 1e5) as usize;
