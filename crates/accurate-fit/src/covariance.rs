@@ -25,7 +25,11 @@ impl CurveCovariance {
         let block = |i: usize, j: usize| {
             if j < controls { inverse.block(i, j) * variance } else { Matrix3::zeros() }
         };
-        let blocks = (0..controls).map(|i| [0, 1, 2, 3].map(|k| block(i, i + k))).collect();
+        Self::from_blocks((0..controls).map(|i| [0, 1, 2, 3].map(|k| block(i, i + k))).collect())
+    }
+
+    /// From the covariance of each control point with itself and the next three.
+    pub(crate) fn from_blocks(blocks: Vec<[Matrix3<f64>; 4]>) -> Self {
         Self { blocks }
     }
 

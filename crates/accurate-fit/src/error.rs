@@ -41,6 +41,12 @@ pub enum FitError {
         /// Rows and columns of the map.
         found: (usize, usize),
     },
+    /// A picture shows nothing along the curve.
+    #[error("view {view}: the image shows nothing dark along the curve")]
+    NotSeenInImage {
+        /// 1 or 2.
+        view: u8,
+    },
     /// The curve has no length, or one that no image can hold.
     #[error("a curve of length {length_px} px cannot be fitted")]
     BadLength {

@@ -1,4 +1,4 @@
-//! One 3D B-spline fitted to both views: to two outlines or to two ordered curves.
+//! One 3D B-spline fitted to both views: to two outlines, two ordered curves, or two pictures.
 
 mod adaptive;
 mod boundary_fit;
@@ -11,6 +11,7 @@ mod curve;
 mod distance_map;
 mod error;
 mod extrapolation;
+mod intensity;
 mod judgement;
 mod minimise;
 mod nearest;
@@ -39,6 +40,7 @@ pub use calibration::{
 };
 pub use covariance::CurveCovariance;
 pub use error::FitError;
+pub use intensity::{IntensityFit, IntensityFitParams, fit_intensities};
 pub use judgement::{Judgement, UnexplainedStretch};
 pub use outline::{BoundaryPoint, Outline};
 pub use outline_params::OutlineFitParams;

@@ -34,6 +34,8 @@ pub struct Diagnostics {
     pub suspicions: Vec<Suspicion>,
     /// How well the curve explains both outlines, where it was fitted to them.
     pub outline: Option<OutlineDiagnostics>,
+    /// What came of the fit to the images' grey levels, where the curve was found in images.
+    pub grey_levels: Option<IntensityDiagnostics>,
     /// What the curve says about the calibration of view 2, if that was asked for.
     pub calibration: Option<CalibrationDiagnostics>,
     /// Why ordered points were matched but not adjusted, if so.
@@ -137,10 +139,24 @@ pub struct OutlineDiagnostics {
     pub evidence: Evidence,
 }
 
+/// What came of fitting a curve on to the grey levels of both images.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct IntensityDiagnostics {
+    /// Why the curve stayed as it was; none if it is the one that explains the grey levels.
+    pub refusal: Option<String>,
+    /// Farthest that the curve was moved in either image, its ends aside, px.
+    pub moved_px: Option<f64>,
+    /// Darkest that the body is drawn in each view, in standard deviations of the noise around it.
+    pub contrast_to_noise: Option<[f64; 2]>,
+    /// Standard deviation of the blot that the body's cross-section makes in each view, px.
+    pub blur_sigma_px: Option<[f64; 2]>,
+}
+
 impl Diagnostics {
     pub(crate) fn of_joint(
         result: &JointResult,
         strays_px: [usize; 2],
+        grey_levels: Option<IntensityDiagnostics>,
         along_epipolar_line: &[bool],
     ) -> Self {
         let judgement = &result.fit.judgement;
@@ -163,6 +179,7 @@ impl Diagnostics {
                 strays_px,
                 evidence: result.evidence,
             }),
+            grey_levels,
             calibration: result.calibration.as_ref().map(CalibrationDiagnostics::from),
             not_adjusted: None,
             points_fit: None,
@@ -197,6 +214,7 @@ impl Diagnostics {
             along_epipolar_line: share(along_epipolar_line),
             suspicions,
             outline: None,
+            grey_levels: None,
             calibration,
             not_adjusted: refusal,
             points_fit: fit,
@@ -235,6 +253,7 @@ impl Diagnostics {
             along_epipolar_line: share(along_epipolar_line),
             suspicions: suspicions(matched.mean_epipolar_distance_px(), 2.0, traces.coverage),
             outline: None,
+            grey_levels: None,
             calibration: None,
             not_adjusted: None,
             points_fit: None,

@@ -39,7 +39,10 @@ mod segment;
 pub mod table;
 mod unrolled;
 
-pub use diagnostics::{CalibrationDiagnostics, Diagnostics, OutlineDiagnostics, PointsDiagnostics};
+pub use diagnostics::{
+    CalibrationDiagnostics, Diagnostics, IntensityDiagnostics, OutlineDiagnostics,
+    PointsDiagnostics,
+};
 pub use error::{Error, Stage};
 pub use explanation::{Alternative, ConsideredCurve, Explanation, JunctionDecision};
 pub use figure::{FigureKind, figure_svg};

@@ -10,7 +10,7 @@ use ndarray::Array2;
 
 use crate::direction::runs_against;
 use crate::ordered_points::adjusted_points;
-use crate::robust::{reconstruct_masks, without_strays};
+use crate::robust::{on_grey_levels, reconstruct_masks, without_strays};
 use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled, sampled_ring};
 use crate::{
     Diagnostics, Error, Explanation, InputKind, Method, Reconstruction, RobustParams, Traces,
@@ -205,6 +205,17 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
     };
     let maps = maps.filter(|_| params.robust.by_probability);
     let result = reconstruct_masks(masks, maps, &pair.rig, &robust, params.closure, &pair.id)?;
+    let images = pair
+        .images
+        .as_ref()
+        .filter(|_| !drawn && params.robust.by_grey_levels && params.closure == Closure::Open);
+    let (result, grey_levels) = match images {
+        Some(images) => {
+            let (result, found) = on_grey_levels(result, images, &pair.rig, &robust);
+            (result, Some(found))
+        }
+        None => (result, None),
+    };
     // The curve was fitted under the corrected camera, if one was asked for.
     let rig = match &result.calibration {
         Some(calibration) => &calibration
@@ -220,7 +231,8 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         sampling(&result.fit.curve, result.fit.covariance.as_ref(), rig);
     let along_epipolar_line = along_epipolar_lines(&points, rig)
         .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;
-    let mut diagnostics = Diagnostics::of_joint(&result, strays_px, &along_epipolar_line);
+    let mut diagnostics =
+        Diagnostics::of_joint(&result, strays_px, grey_levels, &along_epipolar_line);
     diagnostics.closed = params.closure == Closure::Closed;
     let explanation = result.explanation.clone();
     Ok(Reconstruction {

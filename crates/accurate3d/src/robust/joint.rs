@@ -45,6 +45,9 @@ pub struct RobustParams {
     /// over gaps by them; else by the masks alone. On the built-in network's maps more curves are
     /// right, and they are placed better (docs/segmentation.md).
     pub by_probability: bool,
+    /// Whether the curve of a pair from images is fitted on to their grey levels at last: tips end where
+    /// the darkness does, and hooks that are one blob to the network are told apart.
+    pub by_grey_levels: bool,
     /// Whether finalists exchange stretches and are tried on other ways through one view. Never on the
     /// masks of a segmentation: what it adds or misses makes wrong stretches likely.
     pub exchange: bool,
@@ -96,6 +99,7 @@ impl RobustParams {
         good_distance_px: 1.0,
         walk_weight: 0.3,
         by_probability: true,
+        by_grey_levels: true,
         exchange: true,
         turned: true,
         calibration: None,

@@ -6,6 +6,7 @@ mod choice;
 mod evidence;
 mod exchange;
 mod frame;
+mod grey_levels;
 mod joint;
 mod look;
 mod other_ways;
@@ -20,6 +21,7 @@ mod strays;
 mod suspicion;
 
 pub use evidence::Evidence;
+pub(crate) use grey_levels::on_grey_levels;
 pub(crate) use joint::{JointResult, reconstruct_masks};
 pub use joint::{RobustParams, SecondLook};
 pub(crate) use strays::without_strays;

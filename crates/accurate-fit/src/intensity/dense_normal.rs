@@ -1,0 +1,124 @@
+use accurate_geom::nalgebra::{Matrix3, Vector3};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{
+    LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
+};
+use faer::linalg::cholesky::llt::inverse::{inverse, inverse_scratch};
+use faer::linalg::cholesky::llt::solve::{solve_in_place, solve_in_place_scratch};
+use faer::{Mat, MatMut, MatRef, Par};
+
+use crate::FitError;
+use crate::normal::THIRD_DIFFERENCE;
+
+/// Normal equations of a spline whose residuals see control points anywhere along it (a pixel at a
+/// crossing sees both strands), and a few global unknowns behind them. Dense, by faer, one thread:
+/// the same bytes for any number of threads.
+pub(crate) struct DenseNormal {
+    controls: usize,
+    /// Lower triangle, column by column.
+    values: Vec<f64>,
+    gradient: Vec<f64>,
+}
+
+impl DenseNormal {
+    pub(crate) fn new(controls: usize, globals: usize) -> Self {
+        let n = 3 * controls + globals;
+        Self { controls, values: vec![0.0; n * n], gradient: vec![0.0; n] }
+    }
+
+    fn unknowns(&self) -> usize {
+        self.gradient.len()
+    }
+
+    /// Adds `weight / 2 * residual²` with the residual's derivatives: unknowns and values, by
+    /// ascending unknown.
+    pub(crate) fn add(&mut self, derivatives: &[(usize, f64)], residual: f64, weight: f64) {
+        let n = self.unknowns();
+        for (k, &(column, value)) in derivatives.iter().enumerate() {
+            let scaled = weight * value;
+            self.gradient[column] += scaled * residual;
+            let entries = &mut self.values[n * column..n * (column + 1)];
+            for &(row, other) in &derivatives[k..] {
+                entries[row] += scaled * other;
+            }
+        }
+    }
+
+    /// Adds half of `lambda3` times the squared third differences of the control points.
+    pub(crate) fn add_smoothness(&mut self, control: &[Vector3<f64>], lambda3: f64) {
+        for (first, window) in control.windows(4).enumerate() {
+            for axis in 0..3 {
+                let mut difference = 0.0;
+                let mut derivatives = [(0, 0.0); 4];
+                for (k, weight) in THIRD_DIFFERENCE.iter().enumerate() {
+                    difference += window[k][axis] * weight;
+                    derivatives[k] = (3 * (first + k) + axis, *weight);
+                }
+                self.add(&derivatives, difference, lambda3);
+            }
+        }
+    }
+
+    /// The step of `(H + damping · diag(H)) step = -gradient`, the diagonal averaged over the
+    /// coordinates of each control point: the same in every frame of the world.
+    pub(crate) fn step(&self, damping: f64) -> Result<Vec<f64>, FitError> {
+        let n = self.unknowns();
+        let factor = self.factor(damping)?;
+        let mut step: Vec<f64> = self.gradient.iter().map(|g| -g).collect();
+        let mut memory = self.memory(solve_in_place_scratch::<f64>(n, 1, Par::Seq))?;
+        let right = MatMut::from_column_major_slice_mut(&mut step, n, 1);
+        solve_in_place(factor.as_ref(), right, Par::Seq, MemStack::new(&mut memory));
+        if step.iter().all(|s| s.is_finite()) { Ok(step) } else { Err(self.singular()) }
+    }
+
+    /// The inverse's blocks: of each control point with itself and the next three; and of the last
+    /// three unknowns.
+    pub(crate) fn covariance(&self) -> Result<(Vec<[Matrix3<f64>; 4]>, Matrix3<f64>), FitError> {
+        let n = self.unknowns();
+        let factor = self.factor(0.0)?;
+        let mut memory = self.memory(inverse_scratch::<f64>(n, Par::Seq))?;
+        let mut all = Mat::<f64>::zeros(n, n);
+        inverse(all.as_mut(), factor.as_ref(), Par::Seq, MemStack::new(&mut memory));
+        // Only the lower triangle is there.
+        let entry = |row: usize, column: usize| all[(row.max(column), row.min(column))];
+        let block = |i: usize, j: usize| Matrix3::from_fn(|r, c| entry(i + r, j + c));
+        let blocks = (0..self.controls)
+            .map(|i| {
+                [0, 1, 2, 3].map(|k| {
+                    let j = i + k;
+                    if j < self.controls { block(3 * i, 3 * j) } else { Matrix3::zeros() }
+                })
+            })
+            .collect();
+        Ok((blocks, block(n - 3, n - 3)))
+    }
+
+    fn factor(&self, damping: f64) -> Result<Mat<f64>, FitError> {
+        let n = self.unknowns();
+        let mut factor = MatRef::from_column_major_slice(&self.values, n, n).to_owned();
+        let diagonal = |k: usize| self.values[n * k + k];
+        for k in 0..n {
+            let size = if k < 3 * self.controls {
+                let first = k - k % 3;
+                (diagonal(first) + diagonal(first + 1) + diagonal(first + 2)) / 3.0
+            } else {
+                diagonal(k)
+            };
+            factor[(k, k)] += damping * size;
+        }
+        let params = Default::default();
+        let mut memory = self.memory(cholesky_in_place_scratch::<f64>(n, Par::Seq, params))?;
+        let stack = MemStack::new(&mut memory);
+        cholesky_in_place(factor.as_mut(), LltRegularization::default(), Par::Seq, stack, params)
+            .map_err(|_| self.singular())?;
+        Ok(factor)
+    }
+
+    fn memory(&self, scratch: faer::dyn_stack::StackReq) -> Result<MemBuffer, FitError> {
+        MemBuffer::try_new(scratch).map_err(|_| self.singular())
+    }
+
+    fn singular(&self) -> FitError {
+        FitError::Singular { unknowns: self.unknowns() }
+    }
+}

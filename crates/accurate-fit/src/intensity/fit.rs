@@ -1,0 +1,426 @@
+use accurate_geom::nalgebra::{Matrix3, Vector2};
+use accurate_geom::{Curve3, Point3, Rig};
+use ndarray::Array2;
+
+use super::band::Band;
+use super::dense_normal::DenseNormal;
+use super::drawing::{Drawing, SAMPLES_PER_PX};
+use crate::curve::{dense_points, to_curve};
+use crate::pose::{px_per_unit, spans_for};
+use crate::projector::{Nuisance, Projector};
+use crate::uniform_spline::UniformSpline;
+use crate::{CalibrationEstimate, CalibrationPriors, CurveCovariance, FitError};
+
+/// Amplitude and blur of both views, shift and roll of view 2.
+const GLOBALS: usize = 7;
+/// Blur of a thin body in a sharp picture, px, and how far it may be from that.
+const BLUR_PX: f64 = 1.2;
+const BLUR_SIGMA_PX: f64 = 0.3;
+const BLUR_RANGE_PX: (f64, f64) = (0.7, 2.5);
+/// How far back along the curve its end's direction is taken from, px.
+const DIRECTION_PX: f64 = 3.0;
+/// What of an end may move without counting as moved, px.
+const FREE_END_PX: f64 = 8.0;
+
+/// Parameters of [`fit_intensities`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IntensityFitParams {
+    /// Distance of the spline's knots along the curve, px.
+    pub knot_spacing_px: f64,
+    /// Weight of the squared third differences of the control points, 1 / px², beside squares of
+    /// grey levels in standard deviations of their noise.
+    pub lambda3: f64,
+    /// Only pixels this near to the start are looked at, px.
+    pub reach_px: f64,
+    /// Only pixels farther than this from the start show the background, px.
+    pub keep_off_px: f64,
+    /// Standard deviation of the window over which the background is averaged, px.
+    pub background_sigma_px: f64,
+    /// Residuals beyond this count little, standard deviations of the noise.
+    pub cauchy_scale: f64,
+    /// By how much the start is continued at both ends, px: too long, an end is drawn back by what
+    /// it darkens in vain; too short, nothing calls it out.
+    pub extension_px: f64,
+    /// Most Levenberg-Marquardt steps.
+    pub iterations: usize,
+    /// The fit rests when a step gains less than this, in units of half squares.
+    pub tolerance: f64,
+}
+
+impl IntensityFitParams {
+    /// Tuned on seeds 1000 to 1999 of the generated families.
+    pub const DEFAULT: Self = Self {
+        knot_spacing_px: 5.0,
+        lambda3: 10.0,
+        reach_px: 6.0,
+        keep_off_px: 3.0,
+        background_sigma_px: 5.0,
+        cauchy_scale: 3.0,
+        extension_px: 2.0,
+        iterations: 25,
+        tolerance: 0.02,
+    };
+
+    fn validate(&self) -> Result<(), FitError> {
+        for (name, value) in [
+            ("knot_spacing_px", self.knot_spacing_px),
+            ("lambda3", self.lambda3),
+            ("reach_px", self.reach_px),
+            ("keep_off_px", self.keep_off_px),
+            ("background_sigma_px", self.background_sigma_px),
+            ("cauchy_scale", self.cauchy_scale),
+        ] {
+            // No band is wider than an image.
+            if !(value > 0.0 && value < 1e5) {
+                return Err(FitError::BadParameter { name, value });
+            }
+        }
+        if !(0.0..1e3).contains(&self.extension_px) {
+            let value = self.extension_px;
+            return Err(FitError::BadParameter { name: "extension_px", value });
+        }
+        Ok(())
+    }
+}
+
+/// A curve fitted to the grey levels of both images.
+#[derive(Debug, Clone)]
+pub struct IntensityFit {
+    /// The fitted curve.
+    pub curve: Curve3,
+    /// Its uncertainty, given that noise and smoothness are what was taken for them.
+    pub covariance: CurveCovariance,
+    /// What the curve says about the calibration of view 2, if that was among the unknowns.
+    pub calibration: Option<CalibrationEstimate>,
+    /// Standard deviation of the blot that the body's cross-section makes in each view, px.
+    pub blur_sigma_px: [f64; 2],
+    /// Darkest optical depth that the fitted body draws in each view, in standard deviations of the
+    /// noise around it.
+    pub contrast_to_noise: [f64; 2],
+    /// Farthest that a point of the fitted curve lies from the start, or of the start from the fitted
+    /// curve, in either image, px; the last 8 px at their ends aside, which are there to be moved.
+    pub moved_px: f64,
+    /// Levenberg-Marquardt steps taken.
+    pub steps: usize,
+    /// Whether the last step was below the tolerance.
+    pub converged: bool,
+}
+
+/// Moves a curve that is a few pixels off until, drawn as a thin absorber into both views, it explains
+/// the pictures' grey levels best.
+///
+/// A segmentation says where a body is to a pixel or two and draws it wider than it is: a hook of a few
+/// pixels at a tip is one blob to it. In the picture strands that lie upon one another, or run along
+/// the line of sight, are darker, and a tip ends where the darkness does.
+///
+/// The optical depth beyond a smooth background is explained by Gaussian blots along the curve, as much
+/// for each piece of its length as for any other, one amplitude and one blur per view. Robust (Cauchy)
+/// weights keep what crosses the body out of it. `images` hold grey values, shape (height, width),
+/// **bright where much passes** and proportional to it; their scale does not matter. `calibration`: the
+/// correction of view 2 to start from, and its priors; without it the rig is taken as exact.
+///
+/// # Errors
+/// [`FitError::NotSeenInImage`] where a view shows nothing dark along the curve, or is not a picture;
+/// [`FitError::NotInFront`], [`FitError::BadLength`] for an unusable start,
+/// [`FitError::BadParameter`], [`FitError::Singular`].
+///
+/// # Source
+/// Our own; thin absorbers after Beer and Lambert, the weights of Geman and McClure's kind (Cauchy),
+/// Levenberg-Marquardt with accept and reject.
+///
+/// # Cost
+/// O(length · blur²) to draw and O(knots³) to solve per step.
+pub fn fit_intensities(
+    start: &Curve3,
+    images: &[Array2<f32>; 2],
+    rig: &Rig,
+    params: &IntensityFitParams,
+    calibration: Option<(&CalibrationPriors, [f64; 3])>,
+) -> Result<IntensityFit, FitError> {
+    params.validate()?;
+    if let Some((priors, _)) = calibration {
+        priors.validate()?;
+    }
+    let mut projectors = Projector::pair(rig);
+    let nuisance = calibration
+        .map_or(Nuisance::default(), |(_, [x, y, roll])| Nuisance { shift_px: [x, y], roll });
+    projectors[1].set_nuisance(nuisance);
+    let given = dense_points(start);
+    let scale = px_per_unit(&given, &projectors)?;
+    let points = continued(&given, params.extension_px / scale, DIRECTION_PX / scale);
+    let length_px = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>() * scale;
+    let spans = spans_for(length_px, params.knot_spacing_px)?.max(5);
+    let spline = UniformSpline::through(&points, spans)?;
+    let samples = (length_px * SAMPLES_PER_PX).ceil() as usize;
+
+    let before = [0, 1].map(|v| shown(&spline, samples, &projectors[v]));
+    let bands = [
+        Band::new(&images[0], &before[0], 1, params)?,
+        Band::new(&images[1], &before[1], 2, params)?,
+    ];
+    let problem = Problem {
+        bands,
+        samples,
+        lambda3: params.lambda3 * scale * scale,
+        cauchy_scale: params.cauchy_scale,
+        prior_weights: calibration.map(|(priors, _)| priors.weights(1.0)),
+    };
+    let mut state =
+        State { spline, projectors, nuisance, amplitude: [0.0; 2], blur_px: [BLUR_PX; 2] };
+    for view in 0..2 {
+        state.amplitude[view] = problem
+            .first_amplitude(&state, view)
+            .ok_or(FitError::NotSeenInImage { view: view as u8 + 1 })?;
+    }
+    let (steps, converged) = problem.minimise(&mut state, params)?;
+    problem.finish(&state, &given, steps, converged)
+}
+
+/// Everything that stays the same while the curve moves.
+struct Problem {
+    bands: [Band; 2],
+    samples: usize,
+    lambda3: f64,
+    cauchy_scale: f64,
+    /// Of shift x, shift y and roll, if they are unknowns.
+    prior_weights: Option<[f64; 3]>,
+}
+
+#[derive(Clone)]
+struct State {
+    spline: UniformSpline,
+    /// Under `nuisance`.
+    projectors: [Projector; 2],
+    nuisance: Nuisance,
+    /// Optical depth per world unit of the curve.
+    amplitude: [f64; 2],
+    blur_px: [f64; 2],
+}
+
+impl State {
+    fn moved(&self, step: &[f64]) -> Self {
+        let mut next = self.clone();
+        let (controls, globals) = step.split_at(3 * self.spline.control.len());
+        next.spline.add(controls);
+        for view in 0..2 {
+            // An absorber does not shine.
+            next.amplitude[view] =
+                (self.amplitude[view] + globals[view]).max(0.05 * self.amplitude[view]);
+            next.blur_px[view] =
+                (self.blur_px[view] + globals[2 + view]).clamp(BLUR_RANGE_PX.0, BLUR_RANGE_PX.1);
+        }
+        next.nuisance.add(&globals[4..]);
+        next.projectors[1].set_nuisance(next.nuisance);
+        next
+    }
+}
+
+impl Problem {
+    fn drawing(&self, state: &State, view: usize, derivatives: bool) -> Drawing {
+        let (projector, blur) = (&state.projectors[view], state.blur_px[view]);
+        Drawing::new(&state.spline, self.samples, projector, blur, &self.bands[view], derivatives)
+    }
+
+    /// The amplitude that explains the picture best as the curve lies; `None` if that is no darkness.
+    fn first_amplitude(&self, state: &State, view: usize) -> Option<f64> {
+        let (band, drawing) = (&self.bands[view], self.drawing(state, view, false));
+        let (mut along, mut square) = (0.0, 0.0);
+        for (drawn, seen) in drawing.depth.iter().zip(&band.depth) {
+            along += drawn * seen * band.noise;
+            square += drawn * drawn;
+        }
+        let amplitude = along / square;
+        (amplitude > 0.0 && amplitude.is_finite()).then_some(amplitude)
+    }
+
+    fn residuals(&self, state: &State, view: usize, drawing: &Drawing) -> Vec<f64> {
+        let band = &self.bands[view];
+        let scale = state.amplitude[view] / band.noise;
+        band.depth.iter().zip(&drawing.depth).map(|(seen, drawn)| scale * drawn - seen).collect()
+    }
+
+    fn cost(&self, state: &State) -> f64 {
+        let c2 = self.cauchy_scale * self.cauchy_scale;
+        let mut cost = 0.0;
+        for view in 0..2 {
+            let drawing = self.drawing(state, view, false);
+            let residuals = self.residuals(state, view, &drawing);
+            cost += residuals.iter().map(|r| 0.5 * c2 * (r * r / c2).ln_1p()).sum::<f64>();
+            cost += 0.5 * ((state.blur_px[view] - BLUR_PX) / BLUR_SIGMA_PX).powi(2);
+        }
+        for window in state.spline.control.windows(4) {
+            let third = window[3] - window[0] + (window[1] - window[2]) * 3.0;
+            cost += 0.5 * self.lambda3 * third.norm_squared();
+        }
+        if let Some(weights) = self.prior_weights {
+            let values = state.nuisance.values();
+            cost += weights.iter().zip(values).map(|(w, v)| 0.5 * w * v * v).sum::<f64>();
+        }
+        cost
+    }
+
+    fn equations(&self, state: &State) -> DenseNormal {
+        let first_global = 3 * state.spline.control.len();
+        let mut normal = DenseNormal::new(state.spline.control.len(), GLOBALS);
+        let c2 = self.cauchy_scale * self.cauchy_scale;
+        let mut sums = vec![0.0; first_global];
+        let mut seen: Vec<usize> = Vec::new();
+        let mut derivatives = Vec::new();
+        for view in 0..2 {
+            let (band, drawing) = (&self.bands[view], self.drawing(state, view, true));
+            let residuals = self.residuals(state, view, &drawing);
+            let scale = state.amplitude[view] / band.noise;
+            for ((row, drawn), residual) in drawing.rows.iter().zip(&drawing.depth).zip(residuals) {
+                seen.clear();
+                for (span, values) in &row.spans {
+                    for (k, value) in values.iter().enumerate() {
+                        sums[3 * span + k] += scale * value;
+                    }
+                    seen.extend(*span..span + 4);
+                }
+                if seen.is_empty() {
+                    continue;
+                }
+                seen.sort_unstable();
+                seen.dedup();
+                derivatives.clear();
+                for control in &seen {
+                    for k in 3 * control..3 * control + 3 {
+                        derivatives.push((k, std::mem::take(&mut sums[k])));
+                    }
+                }
+                derivatives.push((first_global + view, drawn / band.noise));
+                derivatives.push((first_global + 2 + view, scale * row.blur));
+                if view == 1 && self.prior_weights.is_some() {
+                    let values = row.nuisance.iter().enumerate();
+                    derivatives.extend(values.map(|(k, v)| (first_global + 4 + k, scale * v)));
+                }
+                normal.add(&derivatives, residual, 1.0 / (1.0 + residual * residual / c2));
+            }
+            let off = (state.blur_px[view] - BLUR_PX) / BLUR_SIGMA_PX;
+            normal.add(&[(first_global + 2 + view, 1.0 / BLUR_SIGMA_PX)], off, 1.0);
+        }
+        normal.add_smoothness(&state.spline.control, self.lambda3);
+        // What is no unknown is held where it is.
+        let weights = self.prior_weights.unwrap_or([1.0; 3]);
+        for (k, (weight, value)) in weights.into_iter().zip(state.nuisance.values()).enumerate() {
+            let value = if self.prior_weights.is_some() { value } else { 0.0 };
+            normal.add(&[(first_global + 4 + k, 1.0)], value, weight);
+        }
+        normal
+    }
+
+    /// Levenberg-Marquardt; the number of steps, and whether the last gained next to nothing.
+    fn minimise(
+        &self,
+        state: &mut State,
+        params: &IntensityFitParams,
+    ) -> Result<(usize, bool), FitError> {
+        const TRIES: usize = 6;
+        let mut damping = 1e-3;
+        let mut cost = self.cost(state);
+        for step in 0..params.iterations {
+            let normal = self.equations(state);
+            let mut gain = 0.0;
+            for _ in 0..TRIES {
+                let next = state.moved(&normal.step(damping)?);
+                let next_cost = self.cost(&next);
+                if next_cost < cost {
+                    gain = cost - next_cost;
+                    (*state, cost) = (next, next_cost);
+                    damping = (damping / 5.0).max(1e-7);
+                    break;
+                }
+                damping *= 8.0;
+            }
+            if gain < params.tolerance {
+                return Ok((step + 1, true));
+            }
+        }
+        Ok((params.iterations, false))
+    }
+
+    fn finish(
+        &self,
+        state: &State,
+        given: &[Point3],
+        steps: usize,
+        converged: bool,
+    ) -> Result<IntensityFit, FitError> {
+        let (blocks, nuisance_covariance): (_, Matrix3<f64>) =
+            self.equations(state).covariance()?;
+        let mut moved_px = 0.0f64;
+        let mut contrast_to_noise = [0.0; 2];
+        for view in 0..2 {
+            let projector = &state.projectors[view];
+            let after = shown(&state.spline, self.samples, projector);
+            let before: Vec<_> = given.iter().map(|p| projector.project(&p.coords)).collect();
+            moved_px = moved_px
+                .max(farthest(without_ends(&after), &before))
+                .max(farthest(without_ends(&before), &after));
+            let drawing = self.drawing(state, view, false);
+            let darkest = drawing.depth.iter().copied().fold(0.0, f64::max);
+            contrast_to_noise[view] = state.amplitude[view] * darkest / self.bands[view].noise;
+        }
+        if !moved_px.is_finite() {
+            return Err(FitError::NotFinite { what: "points of the fitted curve", index: 0 });
+        }
+        let Nuisance { shift_px, roll } = state.nuisance;
+        Ok(IntensityFit {
+            curve: to_curve(&state.spline)?,
+            covariance: CurveCovariance::from_blocks(blocks),
+            calibration: self
+                .prior_weights
+                .map(|_| CalibrationEstimate::new(shift_px, roll, nuisance_covariance)),
+            blur_sigma_px: state.blur_px,
+            contrast_to_noise,
+            moved_px,
+            steps,
+            converged,
+        })
+    }
+}
+
+/// The curve's image, by points less than a pixel apart.
+fn shown(spline: &UniformSpline, samples: usize, projector: &Projector) -> Vec<Vector2<f64>> {
+    let du = spline.spans() as f64 / samples as f64;
+    (0..=samples).map(|k| projector.project(&spline.point(k as f64 * du))).collect()
+}
+
+/// The points without those of the last [`FREE_END_PX`] at both ends.
+fn without_ends(points: &[Vector2<f64>]) -> &[Vector2<f64>] {
+    let mut arc_px = Vec::with_capacity(points.len());
+    let mut length_px = 0.0;
+    for (k, p) in points.iter().enumerate() {
+        if k > 0 {
+            length_px += (p - points[k - 1]).norm();
+        }
+        arc_px.push(length_px);
+    }
+    let first = arc_px.partition_point(|arc| *arc < FREE_END_PX);
+    let end = arc_px.partition_point(|arc| *arc <= length_px - FREE_END_PX);
+    &points[first.min(end)..end]
+}
+
+/// Largest distance of a point from the nearest of others.
+fn farthest(points: &[Vector2<f64>], others: &[Vector2<f64>]) -> f64 {
+    let nearest = |p: &Vector2<f64>| {
+        others.iter().map(|o| (p - o).norm_squared()).fold(f64::INFINITY, f64::min)
+    };
+    points.iter().map(nearest).fold(0.0, f64::max).sqrt()
+}
+
+/// The points, continued straight at both ends by `by`, in the direction of the last `over`.
+fn continued(points: &[Point3], by: f64, over: f64) -> Vec<Point3> {
+    let beyond = |end: Option<&Point3>, mut inwards: std::slice::Iter<'_, Point3>| {
+        let end = end?;
+        let back = inwards.find(|p| (*p - end).norm() >= over)?;
+        Some(end + (end - back).try_normalize(0.0)? * by)
+    };
+    let reversed: Vec<_> = points.iter().rev().copied().collect();
+    let mut all = Vec::with_capacity(points.len() + 2);
+    all.extend(beyond(points.first(), points.iter()));
+    all.extend_from_slice(points);
+    all.extend(beyond(points.last(), reversed.iter()));
+    all
+}
