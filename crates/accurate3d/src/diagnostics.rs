@@ -148,8 +148,8 @@ pub struct IntensityDiagnostics {
     pub moved_px: Option<f64>,
     /// Darkest that the body is drawn in each view, in standard deviations of the noise around it.
     pub contrast_to_noise: Option<[f64; 2]>,
-    /// Standard deviation of the blot that the body's cross-section makes in each view, px.
-    pub blur_sigma_px: Option<[f64; 2]>,
+    /// Radius of the body in each view, px, as the width of its blurred cross-section tells it.
+    pub radius_px: Option<[f64; 2]>,
 }
 
 impl Diagnostics {

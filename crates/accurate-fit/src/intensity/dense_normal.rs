@@ -122,3 +122,64 @@ impl DenseNormal {
         FitError::Singular { unknowns: self.unknowns() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::nalgebra::{DMatrix, DVector};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const CONTROLS: usize = 5;
+    const N: usize = 3 * CONTROLS + 7;
+
+    proptest! {
+        #[test]
+        fn step_and_covariance_are_those_of_the_written_out_equations(
+            rows in prop::collection::vec(prop::collection::vec(-1.0..1.0f64, N + 2), 2 * N),
+            points in prop::collection::vec(-1.0..1.0f64, 3 * CONTROLS),
+        ) {
+            let control: Vec<_> =
+                points.chunks_exact(3).map(|p| Vector3::new(p[0], p[1], p[2])).collect();
+            let mut normal = DenseNormal::new(CONTROLS, 7);
+            let (mut h, mut g) = (DMatrix::<f64>::identity(N, N), DVector::<f64>::zeros(N));
+            // Well conditioned: what is compared is the bookkeeping.
+            (0..N).for_each(|k| normal.add(&[(k, 1.0)], 0.0, 1.0));
+            for row in &rows {
+                let (weight, residual) = (row[N].abs(), row[N + 1]);
+                let derivatives: Vec<_> = row[..N].iter().copied().enumerate().collect();
+                normal.add(&derivatives, residual, weight);
+                let a = DVector::from_row_slice(&row[..N]);
+                h += &a * a.transpose() * weight;
+                g += a * (weight * residual);
+            }
+            normal.add_smoothness(&control, 0.7);
+            for first in 0..CONTROLS - 3 {
+                for axis in 0..3 {
+                    let mut a = DVector::<f64>::zeros(N);
+                    for (k, w) in [-1.0, 3.0, -3.0, 1.0].into_iter().enumerate() {
+                        a[3 * (first + k) + axis] = w;
+                    }
+                    let value: f64 = (0..CONTROLS).map(|c| a[3 * c + axis] * control[c][axis]).sum();
+                    h += &a * a.transpose() * 0.7;
+                    g += a * (0.7 * value);
+                }
+            }
+            let inverse = h.clone().try_inverse().unwrap();
+            let expected = -(&inverse * &g);
+            let step = normal.step(0.0).unwrap();
+            for k in 0..N {
+                // Eigenvalues from 1 to some hundreds.
+                prop_assert!((step[k] - expected[k]).abs() < 1e-10 * (1.0 + g.norm()));
+            }
+            let (blocks, last) = normal.covariance().unwrap();
+            for (i, row) in blocks.iter().enumerate() {
+                for (k, block) in row.iter().enumerate().take(CONTROLS - i) {
+                    let there = inverse.fixed_view::<3, 3>(3 * i, 3 * (i + k));
+                    prop_assert!((block - there).norm() < 1e-10);
+                }
+            }
+            prop_assert!((last - inverse.fixed_view::<3, 3>(N - 3, N - 3)).norm() < 1e-10);
+        }
+    }
+}

@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use super::band::Band;
 use super::dense_normal::DenseNormal;
-use super::drawing::{Drawing, SAMPLES_PER_PX};
+use super::drawing::{Drawing, SAMPLES_PER_PX, radius_px};
 use crate::curve::{dense_points, to_curve};
 use crate::pose::{px_per_unit, spans_for};
 use crate::projector::{Nuisance, Projector};
@@ -92,8 +92,8 @@ pub struct IntensityFit {
     pub covariance: CurveCovariance,
     /// What the curve says about the calibration of view 2, if that was among the unknowns.
     pub calibration: Option<CalibrationEstimate>,
-    /// Standard deviation of the blot that the body's cross-section makes in each view, px.
-    pub blur_sigma_px: [f64; 2],
+    /// Radius of the body in each view, px, as the width of its blurred cross-section tells it.
+    pub radius_px: [f64; 2],
     /// Darkest optical depth that the fitted body draws in each view, in standard deviations of the
     /// noise around it.
     pub contrast_to_noise: [f64; 2],
@@ -372,7 +372,7 @@ impl Problem {
             calibration: self
                 .prior_weights
                 .map(|_| CalibrationEstimate::new(shift_px, roll, nuisance_covariance)),
-            blur_sigma_px: state.blur_px,
+            radius_px: state.blur_px.map(radius_px),
             contrast_to_noise,
             moved_px,
             steps,

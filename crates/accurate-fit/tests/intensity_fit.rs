@@ -1,0 +1,120 @@
+//! The fit to grey levels, on pictures of generated wires.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod support;
+
+use accurate_fit::{CalibrationPriors, FitError, IntensityFitParams, fit_intensities};
+use accurate_geom::{Camera, Curve3, Rig};
+use accurate_synth::{
+    CaseOptions, Family, SynthCase, XrayOptions, XrayResponse, generate, render_xray,
+};
+use ndarray::Array2;
+use support::{curve_through, deviation, perturbed, px_per_unit};
+
+const SEED: u64 = 1903;
+
+fn pictures(case: &SynthCase, response: XrayResponse) -> [Array2<f32>; 2] {
+    let options = XrayOptions { response, ..XrayOptions::default() };
+    render_xray(case, &options).map(|image| image.mapv(f32::from))
+}
+
+/// A start that is up to 1.5 px off, `cut` px short at both ends.
+fn start(case: &SynthCase, cut_px: f64) -> Curve3 {
+    let unit_per_px = 1.0 / px_per_unit(case);
+    let moved = perturbed(&case.truth, 1.5 * unit_per_px, unit_per_px);
+    let step = (moved[1] - moved[0]).norm();
+    let cut = (cut_px * unit_per_px / step).round() as usize;
+    curve_through(&moved[cut..moved.len() - cut])
+}
+
+#[test]
+fn a_start_that_is_off_and_short_comes_to_the_body() {
+    for (family, index) in
+        [(Family::Easy, 0), (Family::Easy, 1), (Family::Medium, 0), (Family::Carm, 1)]
+    {
+        let case = generate(family, SEED, index, &CaseOptions::default()).unwrap();
+        let start = start(&case, 3.0);
+        let scale = px_per_unit(&case);
+        let (mean_before, _) = deviation(&start, &case.truth);
+        for response in [XrayResponse::Linear, XrayResponse::Log] {
+            let images = pictures(&case, response);
+            let found =
+                fit_intensities(&start, &images, &case.rig, &IntensityFitParams::DEFAULT, None)
+                    .unwrap();
+            let (mean, max) = deviation(&found.curve, &case.truth);
+            // Noise of a third of the contrast (less here) places a stretch of 5 px of a blot of 1.1 px
+            // to 1.1 / sqrt(5) · 0.3 = 0.15 px in each view; in 3D up to twice that, where both views
+            // and a direction seen by one alone add up.
+            assert!(mean * scale < 0.3, "{} {response:?}: {} px", case.id, mean * scale);
+            assert!(mean < 0.5 * mean_before, "{}", case.id);
+            // Ends: a radius of the body.
+            assert!(max * scale < 2.0, "{} {response:?}: {} px", case.id, max * scale);
+            assert!(found.moved_px < 4.0 && found.calibration.is_none(), "{found:?}");
+        }
+    }
+}
+
+#[test]
+fn scale_of_the_grey_levels_does_not_matter_and_bytes_repeat() {
+    let case = generate(Family::Easy, SEED, 2, &CaseOptions::default()).unwrap();
+    let start = start(&case, 0.0);
+    let images = pictures(&case, XrayResponse::Linear);
+    let fit = |images: &[Array2<f32>; 2]| {
+        fit_intensities(&start, images, &case.rig, &IntensityFitParams::DEFAULT, None).unwrap()
+    };
+    let found = fit(&images);
+    assert_eq!(found.curve, fit(&images).curve);
+    // A power of two changes no digit.
+    assert_eq!(found.curve, fit(&images.map(|image| image * 0.25)).curve);
+}
+
+#[test]
+fn a_shift_of_the_second_picture_is_found_across_the_epipolar_lines() {
+    let case = generate(Family::Medium, SEED, 1, &CaseOptions::default()).unwrap();
+    let images = pictures(&case, XrayResponse::Linear);
+    let camera = case.rig.camera2();
+    let mut k = *camera.k();
+    k[(0, 2)] += 0.4;
+    k[(1, 2)] -= 0.5;
+    let wrong = Camera::new(k, *camera.r(), *camera.t(), camera.size()).unwrap();
+    let rig = Rig::new(case.rig.camera1().clone(), wrong, case.rig.unit()).unwrap();
+    let priors = CalibrationPriors::DEFAULT;
+    let found = fit_intensities(
+        &curve_through(&case.truth),
+        &images,
+        &rig,
+        &IntensityFitParams::DEFAULT,
+        Some((&priors, [0.0; 3])),
+    )
+    .unwrap()
+    .calibration
+    .unwrap();
+    let across = |v: [f64; 2]| v[0] * found.observed[0] + v[1] * found.observed[1];
+    // Principal points are shifted by an error, and back by its correction.
+    let off = across(found.shift_px) - across([-0.4, 0.5]);
+    assert!(found.observed_sigma_px < 0.1, "{found:?}");
+    // Grey levels between the blots' shape and the cylinder's: a tenth of a pixel besides noise.
+    assert!(off.abs() < 5.0 * found.observed_sigma_px + 0.1, "{off} {found:?}");
+}
+
+#[test]
+fn what_shows_no_body_is_refused() {
+    let case = generate(Family::Easy, SEED, 3, &CaseOptions::default()).unwrap();
+    let curve = curve_through(&case.truth);
+    let images = pictures(&case, XrayResponse::Linear);
+    let fit = |images: &[Array2<f32>; 2]| {
+        fit_intensities(&curve, images, &case.rig, &IntensityFitParams::DEFAULT, None)
+    };
+    let not_seen = |view| Err(FitError::NotSeenInImage { view });
+    let [first, second] = images.clone();
+    let outcome = |images| fit(&images).map(|_| ());
+    assert_eq!(outcome([first.clone(), Array2::zeros(second.dim())]), not_seen(2));
+    assert_eq!(outcome([Array2::zeros((0, 0)), second.clone()]), not_seen(1));
+    assert_eq!(outcome([first.clone(), second.mapv(|v| 60_000.0 - v)]), not_seen(2));
+    let mut broken = first.clone();
+    broken[(3, 4)] = f32::NAN;
+    assert_eq!(outcome([broken, second.clone()]), not_seen(1));
+    let params = IntensityFitParams { lambda3: f64::NAN, ..IntensityFitParams::DEFAULT };
+    let refused = fit_intensities(&curve, &images, &case.rig, &params, None).map(|_| ());
+    assert!(matches!(refused, Err(FitError::BadParameter { name: "lambda3", .. })), "{refused:?}");
+}
