@@ -4,6 +4,9 @@ use accurate_geom::nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 use crate::selected_inverse::SelectedInverse;
 use crate::uniform_spline::{UniformSpline, basis};
 
+/// Per control point: its covariance with itself and the next three.
+pub(crate) type ControlBlocks = Vec<[Matrix3<f64>; 4]>;
+
 /// How uncertain a fitted curve is, point by point.
 ///
 /// The curve is the most probable one given the data and a prior on its bending whose strength was
@@ -16,8 +19,7 @@ use crate::uniform_spline::{UniformSpline, basis};
 /// 75 to 85 %). `cargo run -p accurate-fit --example coverage` measures it.
 #[derive(Debug, Clone)]
 pub struct CurveCovariance {
-    /// Per control point: its covariance with itself and the next three.
-    blocks: Vec<[Matrix3<f64>; 4]>,
+    blocks: ControlBlocks,
 }
 
 impl CurveCovariance {
@@ -29,7 +31,7 @@ impl CurveCovariance {
     }
 
     /// From the covariance of each control point with itself and the next three.
-    pub(crate) fn from_blocks(blocks: Vec<[Matrix3<f64>; 4]>) -> Self {
+    pub(crate) fn from_blocks(blocks: ControlBlocks) -> Self {
         Self { blocks }
     }
 

@@ -8,6 +8,7 @@ use faer::linalg::cholesky::llt::solve::{solve_in_place, solve_in_place_scratch}
 use faer::{Mat, MatMut, MatRef, Par};
 
 use crate::FitError;
+use crate::covariance::ControlBlocks;
 use crate::normal::THIRD_DIFFERENCE;
 
 /// Normal equations of a spline whose residuals see control points anywhere along it (a pixel at a
@@ -73,7 +74,7 @@ impl DenseNormal {
 
     /// The inverse's blocks: of each control point with itself and the next three; and of the last
     /// three unknowns.
-    pub(crate) fn covariance(&self) -> Result<(Vec<[Matrix3<f64>; 4]>, Matrix3<f64>), FitError> {
+    pub(crate) fn covariance(&self) -> Result<(ControlBlocks, Matrix3<f64>), FitError> {
         let n = self.unknowns();
         let factor = self.factor(0.0)?;
         let mut memory = self.memory(inverse_scratch::<f64>(n, Par::Seq))?;

@@ -13,6 +13,8 @@ use crate::{CalibrationEstimate, CalibrationPriors, CurveCovariance, FitError};
 
 /// Amplitude and blur of both views, shift and roll of view 2.
 const GLOBALS: usize = 7;
+/// The dense equations of more knots take seconds a step.
+const MOST_SPANS: usize = 600;
 /// Blur of a thin body in a sharp picture, px, and how far it may be from that.
 const BLUR_PX: f64 = 1.2;
 const BLUR_SIGMA_PX: f64 = 0.3;
@@ -121,11 +123,11 @@ pub struct IntensityFit {
 ///
 /// # Errors
 /// [`FitError::NotSeenInImage`] where a view shows nothing dark along the curve, or is not a picture;
-/// [`FitError::NotInFront`], [`FitError::BadLength`] for an unusable start,
+/// [`FitError::NotInFront`], [`FitError::BadLength`] for an unusable start or one longer than 600 knots;
 /// [`FitError::BadParameter`], [`FitError::Singular`].
 ///
 /// # Source
-/// Our own; thin absorbers after Beer and Lambert, the weights of Geman and McClure's kind (Cauchy),
+/// Our own; thin absorbers after Beer and Lambert, robust weights of Cauchy's distribution,
 /// Levenberg-Marquardt with accept and reject.
 ///
 /// # Cost
@@ -150,6 +152,9 @@ pub fn fit_intensities(
     let points = continued(&given, params.extension_px / scale, DIRECTION_PX / scale);
     let length_px = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>() * scale;
     let spans = spans_for(length_px, params.knot_spacing_px)?.max(5);
+    if spans > MOST_SPANS {
+        return Err(FitError::BadLength { length_px });
+    }
     let spline = UniformSpline::through(&points, spans)?;
     let samples = (length_px * SAMPLES_PER_PX).ceil() as usize;
 

@@ -66,3 +66,78 @@ fn reason_against(fit: &IntensityFit) -> Option<String> {
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use accurate_eval::curve_scores;
+    use accurate_synth::{CaseOptions, Family, SynthCase, XrayOptions, generate, render_xray};
+
+    use crate::{InputKind, Method, Params, Reconstruction, ViewPair, reconstruct};
+
+    /// A map that ends `missing_px` before the body does, beside the picture.
+    fn pair(case: &SynthCase, missing_px: f64, options: &XrayOptions) -> ViewPair {
+        let mut pair = ViewPair::from(case.clone());
+        let tips = [0, case.truth.len() - 1].map(|k| case.rig.project(&case.truth[k]).unwrap());
+        let near = |x: usize, y: usize, at: [f64; 2]| {
+            (x as f64 - at[0]).hypot(y as f64 - at[1]) < missing_px
+        };
+        let [mut mask1, mut mask2] = case.masks.clone();
+        for (p1, p2) in tips {
+            let cut1 = |((y, x), b): ((usize, usize), &mut bool)| *b &= !near(x, y, [p1.x, p1.y]);
+            mask1.indexed_iter_mut().for_each(cut1);
+            let cut2 = |((y, x), b): ((usize, usize), &mut bool)| *b &= !near(x, y, [p2.x, p2.y]);
+            mask2.indexed_iter_mut().for_each(cut2);
+        }
+        let masks = [mask1, mask2];
+        pair.probabilities = Some(masks.clone().map(|m| m.mapv(|b| if b { 0.99 } else { 0.01 })));
+        pair.masks = Some(masks);
+        pair.images = Some(render_xray(case, options).map(|image| image.mapv(f32::from)));
+        pair
+    }
+
+    fn curve(pair: &ViewPair, by_grey_levels: bool) -> Reconstruction {
+        let mut params = Params::new(InputKind::Image, Method::Accurate);
+        params.robust.by_grey_levels = by_grey_levels;
+        reconstruct(pair, &params).unwrap()
+    }
+
+    #[test]
+    fn a_thin_body_ends_where_its_darkness_does() {
+        let clear = XrayOptions { dose_photons_per_px: 1e5, background: 0.0, ..Default::default() };
+        for index in [0, 2, 3] {
+            let case = generate(Family::Carm, 1904, index, &CaseOptions::default()).unwrap();
+            let pair = pair(&case, 5.0, &clear);
+            let off = |r: &Reconstruction| {
+                curve_scores(&r.positions(), &case.truth, 0.1).unwrap().hausdorff
+            };
+            let (by_map, by_picture) = (curve(&pair, false), curve(&pair, true));
+            assert!(by_map.diagnostics.grey_levels.is_none());
+            let found = by_picture.diagnostics.grey_levels.as_ref().unwrap();
+            assert_eq!(found.refusal, None, "{index} {found:?}");
+            assert_eq!(
+                by_picture.covariances.as_ref().map(Vec::len),
+                Some(by_picture.points.len())
+            );
+            let (before, after) = (off(&by_map), off(&by_picture));
+            assert!(after < 0.5 * before, "{index}: {before} -> {after} mm");
+        }
+    }
+
+    #[test]
+    fn thick_bodies_and_curves_that_are_carried_off_stay_as_they_are() {
+        let case = generate(Family::Medium, 1904, 0, &CaseOptions::default()).unwrap();
+        let mut pair = pair(&case, 0.0, &XrayOptions::default());
+        let by_map = curve(&pair, false);
+        let kept = curve(&pair, true);
+        assert_eq!(kept.points, by_map.points);
+        let refusal =
+            |r: &Reconstruction| r.diagnostics.grey_levels.clone().unwrap().refusal.unwrap();
+        assert!(refusal(&kept).contains("radius"), "{}", refusal(&kept));
+        if let Some(images) = &mut pair.images {
+            images[1].fill(1000.0);
+        }
+        let blank = curve(&pair, true);
+        assert_eq!(blank.points, by_map.points);
+        assert!(refusal(&blank).contains("view 2"), "{}", refusal(&blank));
+    }
+}
