@@ -111,6 +111,9 @@ fn what_shows_no_body_is_refused() {
     assert_eq!(outcome([first.clone(), Array2::zeros(second.dim())]), not_seen(2));
     assert_eq!(outcome([Array2::zeros((0, 0)), second.clone()]), not_seen(1));
     assert_eq!(outcome([first.clone(), second.mapv(|v| 60_000.0 - v)]), not_seen(2));
+    // A shadow: whatever lies on it, it is no darker.
+    let shadow = case.masks[1].mapv(|body| if body { 0.0 } else { 255.0 });
+    assert_eq!(outcome([first.clone(), shadow]), not_seen(2));
     let mut broken = first.clone();
     broken[(3, 4)] = f32::NAN;
     assert_eq!(outcome([broken, second.clone()]), not_seen(1));

@@ -7,7 +7,7 @@ use crate::FitError;
 
 /// Rounds of the background's robust weights.
 const BACKGROUND_ROUNDS: usize = 3;
-/// A pixel darker than this part of the brightest lets no more light through that could be measured.
+/// A pixel that is no brighter than this part of the brightest is black.
 const DARKEST: f64 = 0.02;
 /// Median of the absolute value of a standard normal variable, inverse.
 const MAD_TO_SIGMA: f64 = 1.4826;
@@ -84,8 +84,9 @@ impl Band {
 
         let mut index = Array2::from_elem(depth.dim(), OUTSIDE);
         let mut inside = Vec::new();
-        for ((at, d), v) in near.indexed_iter().zip(&beyond) {
-            if *d <= params.reach_px {
+        for (((at, d), v), depth) in near.indexed_iter().zip(&beyond).zip(&depth) {
+            // What is black may be any darker.
+            if *d <= params.reach_px && *depth < -DARKEST.ln() {
                 index[at] = inside.len() as u32;
                 inside.push(v / noise);
             }

@@ -75,7 +75,8 @@ pub(crate) fn radius_px(blur_px: f64) -> f64 {
 enum Piece {
     /// A stretch of the curve, `du` long in its parameter.
     Stretch { du: f64 },
-    /// The half ball beyond an end: a tip is a round cap, as its outline is.
+    /// The half ball beyond an end: a tip is a round cap, as its outline is. That it grows with the blur
+    /// is left out of the derivatives; steps that gain nothing are not taken.
     Cap { radius_px: f64, outwards: f64 },
 }
 

@@ -118,8 +118,9 @@ pub struct IntensityFit {
 /// The optical depth beyond a smooth background is explained by Gaussian blots along the curve, as much
 /// for each piece of its length as for any other, one amplitude and one blur per view. Robust (Cauchy)
 /// weights keep what crosses the body out of it. `images` hold grey values, shape (height, width),
-/// **bright where much passes** and proportional to it; their scale does not matter. `calibration`: the
-/// correction of view 2 to start from, and its priors; without it the rig is taken as exact.
+/// **bright where much passes** and proportional to it, or to its logarithm (a body then seems somewhat
+/// darker on a dark background); their scale does not matter. `calibration`: priors of the correction
+/// of view 2, and the shift x, shift y (px) and roll (rad) to start from; without it the rig is exact.
 ///
 /// # Errors
 /// [`FitError::NotSeenInImage`] where a view shows nothing dark along the curve, or is not a picture;
