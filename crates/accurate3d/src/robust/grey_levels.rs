@@ -12,6 +12,9 @@ const MOST_MOVED_PX: f64 = 8.0;
 /// Bodies thicker than this, px, are drawn by a segmentation as they are, hooks and all, and their edges
 /// say more than blots of one width; thinner ones it draws thicker.
 const MOST_RADIUS_PX: f64 = 1.35;
+/// A picture made by photons has noise. Where the body is darker than so many of its standard
+/// deviations it is a drawing, and the edges are exact.
+const MOST_CONTRAST_TO_NOISE: f64 = 1000.0;
 
 /// The curve fitted on to the grey levels of the images that its maps were made of, and what came of
 /// it. Where that fails, or is carried off, or the body is no thin one, the curve stays as it was.
@@ -56,12 +59,15 @@ impl IntensityDiagnostics {
 
 fn reason_against(fit: &IntensityFit) -> Option<String> {
     let radius_px = 0.5 * (fit.radius_px[0] + fit.radius_px[1]);
+    let contrast = fit.contrast_to_noise[0].min(fit.contrast_to_noise[1]);
     if fit.moved_px > MOST_MOVED_PX {
         Some(format!("carried off by {:.1} px, {MOST_MOVED_PX} at most", fit.moved_px))
     } else if radius_px > MOST_RADIUS_PX {
         Some(format!(
             "a body of radius {radius_px:.2} px is drawn as it is, {MOST_RADIUS_PX} at most"
         ))
+    } else if contrast > MOST_CONTRAST_TO_NOISE {
+        Some(format!("a body {contrast:.0} times as dark as the noise is placed by its edges"))
     } else {
         None
     }
