@@ -155,7 +155,8 @@ pub(crate) fn finish(
         converged,
         smoothness,
         surprise: None,
-        covariance: posterior
-            .map(|(inverse, variance)| CurveCovariance::new(inverse, controls, variance)),
+        covariance: posterior.map(|(inverse, variance)| {
+            CurveCovariance::new(controls, |i, j| inverse.block(i, j) * variance)
+        }),
     })
 }

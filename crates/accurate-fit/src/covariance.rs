@@ -1,11 +1,7 @@
 use accurate_geom::Curve3;
 use accurate_geom::nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 
-use crate::selected_inverse::SelectedInverse;
 use crate::uniform_spline::{UniformSpline, basis};
-
-/// Per control point: its covariance with itself and the next three.
-pub(crate) type ControlBlocks = Vec<[Matrix3<f64>; 4]>;
 
 /// How uncertain a fitted curve is, point by point.
 ///
@@ -19,19 +15,15 @@ pub(crate) type ControlBlocks = Vec<[Matrix3<f64>; 4]>;
 /// 75 to 85 %). `cargo run -p accurate-fit --example coverage` measures it.
 #[derive(Debug, Clone)]
 pub struct CurveCovariance {
-    blocks: ControlBlocks,
+    /// Per control point: its covariance with itself and the next three.
+    blocks: Vec<[Matrix3<f64>; 4]>,
 }
 
 impl CurveCovariance {
-    pub(crate) fn new(inverse: &SelectedInverse, controls: usize, variance: f64) -> Self {
-        let block = |i: usize, j: usize| {
-            if j < controls { inverse.block(i, j) * variance } else { Matrix3::zeros() }
-        };
-        Self::from_blocks((0..controls).map(|i| [0, 1, 2, 3].map(|k| block(i, i + k))).collect())
-    }
-
-    /// From the covariance of each control point with itself and the next three.
-    pub(crate) fn from_blocks(blocks: ControlBlocks) -> Self {
+    /// From the covariance of control points that share a span.
+    pub(crate) fn new(controls: usize, block: impl Fn(usize, usize) -> Matrix3<f64>) -> Self {
+        let within = |i, j| if j < controls { block(i, j) } else { Matrix3::zeros() };
+        let blocks = (0..controls).map(|i| [0, 1, 2, 3].map(|k| within(i, i + k))).collect();
         Self { blocks }
     }
 

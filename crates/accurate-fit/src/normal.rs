@@ -17,6 +17,21 @@ use crate::span_blocks::{LinearRow, PAIRS, PRODUCT, SpanBlocks};
 /// Third difference of four control points.
 pub(crate) const THIRD_DIFFERENCE: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
 
+/// What of the diagonal is damped at an unknown: the mean over the coordinates of a control point, the
+/// same in every frame of the world; of a global unknown its own.
+pub(crate) fn to_be_damped(
+    unknown: usize,
+    controls: usize,
+    diagonal: impl Fn(usize) -> f64,
+) -> f64 {
+    if unknown < 3 * controls {
+        let first = unknown - unknown % 3;
+        (diagonal(first) + diagonal(first + 1) + diagonal(first + 2)) / 3.0
+    } else {
+        diagonal(unknown)
+    }
+}
+
 /// Normal equations of a uniform cubic spline (three unknowns per control point) and a few global
 /// unknowns behind them: `(H + damping) step = -gradient`.
 ///
@@ -218,16 +233,9 @@ impl NormalEquations {
         if !(largest > 0.0 && largest.is_finite()) {
             return Err(singular);
         }
-        let controls = 3 * self.controls;
         for column in 0..unknowns {
             let diagonal = |c: usize| self.values[self.base[c].wrapping_add(c)];
-            // The mean over the three coordinates: the same in every frame of the world.
-            let size = if column < controls {
-                let first = column - column % 3;
-                (diagonal(first) + diagonal(first + 1) + diagonal(first + 2)) / 3.0
-            } else {
-                diagonal(column)
-            };
+            let size = to_be_damped(column, self.controls, diagonal);
             // An unknown that no residual sees must still have a pivot.
             self.damped[self.base[column].wrapping_add(column)] +=
                 damping * size.max(1e-9 * largest);

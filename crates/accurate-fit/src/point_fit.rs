@@ -370,7 +370,9 @@ impl<'a> Fitter<'a> {
             chi2_per_point,
             surprise,
             calibration,
-            covariance: CurveCovariance::new(&inverse, state.spline.control.len(), variance),
+            covariance: CurveCovariance::new(state.spline.control.len(), |i, j| {
+                inverse.block(i, j) * variance
+            }),
             parameters: state.parameters,
         })
     }

@@ -204,18 +204,12 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         ..params.robust
     };
     let maps = maps.filter(|_| params.robust.by_probability);
-    let result = reconstruct_masks(masks, maps, &pair.rig, &robust, params.closure, &pair.id)?;
+    let mut result = reconstruct_masks(masks, maps, &pair.rig, &robust, params.closure, &pair.id)?;
     let images = pair
         .images
         .as_ref()
         .filter(|_| !drawn && params.robust.by_grey_levels && params.closure == Closure::Open);
-    let (result, grey_levels) = match images {
-        Some(images) => {
-            let (result, found) = on_grey_levels(result, images, &pair.rig, &robust);
-            (result, Some(found))
-        }
-        None => (result, None),
-    };
+    let grey_levels = images.map(|images| on_grey_levels(&mut result, images, &pair.rig, &robust));
     // The curve was fitted under the corrected camera, if one was asked for.
     let rig = match &result.calibration {
         Some(calibration) => &calibration

@@ -97,7 +97,6 @@ mod tests {
             assert_eq!(pair.masks.as_ref(), Some(&case.masks));
             let mut params = Params::new(InputKind::Image, method);
             params.robust.by_probability = false;
-            params.robust.by_grey_levels = false;
             let image = reconstruct(&pair, &params).unwrap();
             let masks = ViewPair::from(case.clone());
             let mask = reconstruct(&masks, &Params::new(InputKind::Mask, method)).unwrap();
@@ -112,7 +111,6 @@ mod tests {
         let pair = segment_images(pair, &Dark { cut: 0 }, &unwatched).unwrap();
         let mut params = Params::new(InputKind::Image, Method::Accurate);
         assert!(params.robust.by_probability);
-        params.robust.by_grey_levels = false;
         let by_map = reconstruct(&pair, &params).unwrap();
         params.input = InputKind::Mask;
         let by_mask = reconstruct(&ViewPair::from(case), &params).unwrap();

@@ -8,8 +8,7 @@ use faer::linalg::cholesky::llt::solve::{solve_in_place, solve_in_place_scratch}
 use faer::{Mat, MatMut, MatRef, Par};
 
 use crate::FitError;
-use crate::covariance::ControlBlocks;
-use crate::normal::THIRD_DIFFERENCE;
+use crate::normal::{THIRD_DIFFERENCE, to_be_damped};
 
 /// Normal equations of a spline whose residuals see control points anywhere along it (a pixel at a
 /// crossing sees both strands), and a few global unknowns behind them. Dense, by faer, one thread:
@@ -72,26 +71,14 @@ impl DenseNormal {
         if step.iter().all(|s| s.is_finite()) { Ok(step) } else { Err(self.singular()) }
     }
 
-    /// The inverse's blocks: of each control point with itself and the next three; and of the last
-    /// three unknowns.
-    pub(crate) fn covariance(&self) -> Result<(ControlBlocks, Matrix3<f64>), FitError> {
+    /// The inverse of the undamped matrix.
+    pub(crate) fn inverse(&self) -> Result<DenseInverse, FitError> {
         let n = self.unknowns();
         let factor = self.factor(0.0)?;
         let mut memory = self.memory(inverse_scratch::<f64>(n, Par::Seq))?;
-        let mut all = Mat::<f64>::zeros(n, n);
-        inverse(all.as_mut(), factor.as_ref(), Par::Seq, MemStack::new(&mut memory));
-        // Only the lower triangle is there.
-        let entry = |row: usize, column: usize| all[(row.max(column), row.min(column))];
-        let block = |i: usize, j: usize| Matrix3::from_fn(|r, c| entry(i + r, j + c));
-        let blocks = (0..self.controls)
-            .map(|i| {
-                [0, 1, 2, 3].map(|k| {
-                    let j = i + k;
-                    if j < self.controls { block(3 * i, 3 * j) } else { Matrix3::zeros() }
-                })
-            })
-            .collect();
-        Ok((blocks, block(n - 3, n - 3)))
+        let mut lower = Mat::<f64>::zeros(n, n);
+        inverse(lower.as_mut(), factor.as_ref(), Par::Seq, MemStack::new(&mut memory));
+        Ok(DenseInverse { lower })
     }
 
     fn factor(&self, damping: f64) -> Result<Mat<f64>, FitError> {
@@ -99,13 +86,7 @@ impl DenseNormal {
         let mut factor = MatRef::from_column_major_slice(&self.values, n, n).to_owned();
         let diagonal = |k: usize| self.values[n * k + k];
         for k in 0..n {
-            let size = if k < 3 * self.controls {
-                let first = k - k % 3;
-                (diagonal(first) + diagonal(first + 1) + diagonal(first + 2)) / 3.0
-            } else {
-                diagonal(k)
-            };
-            factor[(k, k)] += damping * size;
+            factor[(k, k)] += damping * to_be_damped(k, self.controls, diagonal);
         }
         let params = Default::default();
         let mut memory = self.memory(cholesky_in_place_scratch::<f64>(n, Par::Seq, params))?;
@@ -121,6 +102,22 @@ impl DenseNormal {
 
     fn singular(&self) -> FitError {
         FitError::Singular { unknowns: self.unknowns() }
+    }
+}
+
+/// The inverse of a symmetric matrix, of which the lower triangle is there.
+pub(crate) struct DenseInverse {
+    lower: Mat<f64>,
+}
+
+impl DenseInverse {
+    pub(crate) fn get(&self, row: usize, column: usize) -> f64 {
+        self.lower[(row.max(column), row.min(column))]
+    }
+
+    /// The 3 x 3 block of control points `i` and `j`.
+    pub(crate) fn block(&self, i: usize, j: usize) -> Matrix3<f64> {
+        Matrix3::from_fn(|a, b| self.get(3 * i + a, 3 * j + b))
     }
 }
 
@@ -173,13 +170,14 @@ mod tests {
                 // Eigenvalues from 1 to some hundreds.
                 prop_assert!((step[k] - expected[k]).abs() < 1e-10 * (1.0 + g.norm()));
             }
-            let (blocks, last) = normal.covariance().unwrap();
-            for (i, row) in blocks.iter().enumerate() {
-                for (k, block) in row.iter().enumerate().take(CONTROLS - i) {
-                    let there = inverse.fixed_view::<3, 3>(3 * i, 3 * (i + k));
-                    prop_assert!((block - there).norm() < 1e-10);
+            let found = normal.inverse().unwrap();
+            for i in 0..CONTROLS {
+                for j in i..CONTROLS.min(i + 4) {
+                    let there = inverse.fixed_view::<3, 3>(3 * i, 3 * j);
+                    prop_assert!((found.block(i, j) - there).norm() < 1e-10);
                 }
             }
+            let last = Matrix3::from_fn(|a, b| found.get(N - 3 + a, N - 3 + b));
             prop_assert!((last - inverse.fixed_view::<3, 3>(N - 3, N - 3)).norm() < 1e-10);
         }
     }

@@ -1,11 +1,12 @@
 use accurate_geom::nalgebra::{Matrix3, Vector2};
-use accurate_geom::{Curve3, Point3, Rig};
+use accurate_geom::{Curve3, Point2, Point3, Polyline2, Rig};
 use ndarray::Array2;
 
 use super::band::Band;
 use super::dense_normal::DenseNormal;
 use super::drawing::{Drawing, SAMPLES_PER_PX, radius_px};
 use crate::curve::{dense_points, to_curve};
+use crate::outline_problem::smoothness;
 use crate::pose::{px_per_unit, spans_for};
 use crate::projector::{Nuisance, Projector};
 use crate::uniform_spline::UniformSpline;
@@ -254,10 +255,7 @@ impl Problem {
             cost += residuals.iter().map(|r| 0.5 * c2 * (r * r / c2).ln_1p()).sum::<f64>();
             cost += 0.5 * ((state.blur_px[view] - BLUR_PX) / BLUR_SIGMA_PX).powi(2);
         }
-        for window in state.spline.control.windows(4) {
-            let third = window[3] - window[0] + (window[1] - window[2]) * 3.0;
-            cost += 0.5 * self.lambda3 * third.norm_squared();
-        }
+        cost += 0.5 * smoothness(&state.spline, 0.0, self.lambda3, &[]);
         if let Some(weights) = self.prior_weights {
             let values = state.nuisance.values();
             cost += weights.iter().zip(values).map(|(w, v)| 0.5 * w * v * v).sum::<f64>();
@@ -310,7 +308,6 @@ impl Problem {
         // What is no unknown is held where it is.
         let weights = self.prior_weights.unwrap_or([1.0; 3]);
         for (k, (weight, value)) in weights.into_iter().zip(state.nuisance.values()).enumerate() {
-            let value = if self.prior_weights.is_some() { value } else { 0.0 };
             normal.add(&[(first_global + 4 + k, 1.0)], value, weight);
         }
         normal
@@ -353,14 +350,19 @@ impl Problem {
         steps: usize,
         converged: bool,
     ) -> Result<IntensityFit, FitError> {
-        let (blocks, nuisance_covariance): (_, Matrix3<f64>) =
-            self.equations(state).covariance()?;
+        let inverse = self.equations(state).inverse()?;
+        let controls = state.spline.control.len();
+        let nuisance = 3 * controls + GLOBALS - 3;
+        let nuisance_covariance = Matrix3::from_fn(|a, b| inverse.get(nuisance + a, nuisance + b));
         let mut moved_px = 0.0f64;
         let mut contrast_to_noise = [0.0; 2];
         for view in 0..2 {
             let projector = &state.projectors[view];
-            let after = shown(&state.spline, self.samples, projector);
-            let before: Vec<_> = given.iter().map(|p| projector.project(&p.coords)).collect();
+            let line = |points: Vec<Vector2<f64>>| {
+                Polyline2::new(points.into_iter().map(Point2::from).collect())
+            };
+            let after = line(shown(&state.spline, self.samples, projector))?;
+            let before = line(given.iter().map(|p| projector.project(&p.coords)).collect())?;
             moved_px = moved_px
                 .max(farthest(without_ends(&after), &before))
                 .max(farthest(without_ends(&before), &after));
@@ -368,13 +370,10 @@ impl Problem {
             let darkest = drawing.depth.iter().copied().fold(0.0, f64::max);
             contrast_to_noise[view] = state.amplitude[view] * darkest / self.bands[view].noise;
         }
-        if !moved_px.is_finite() {
-            return Err(FitError::NotFinite { what: "points of the fitted curve", index: 0 });
-        }
         let Nuisance { shift_px, roll } = state.nuisance;
         Ok(IntensityFit {
             curve: to_curve(&state.spline)?,
-            covariance: CurveCovariance::from_blocks(blocks),
+            covariance: CurveCovariance::new(controls, |i, j| inverse.block(i, j)),
             calibration: self
                 .prior_weights
                 .map(|_| CalibrationEstimate::new(shift_px, roll, nuisance_covariance)),
@@ -394,24 +393,17 @@ fn shown(spline: &UniformSpline, samples: usize, projector: &Projector) -> Vec<V
 }
 
 /// The points without those of the last [`FREE_END_PX`] at both ends.
-fn without_ends(points: &[Vector2<f64>]) -> &[Vector2<f64>] {
-    let mut arc_px = Vec::with_capacity(points.len());
-    let mut length_px = 0.0;
-    for (k, p) in points.iter().enumerate() {
-        if k > 0 {
-            length_px += (p - points[k - 1]).norm();
-        }
-        arc_px.push(length_px);
-    }
+fn without_ends(line: &Polyline2) -> &[Point2] {
+    let arc_px = line.cumulative_lengths();
     let first = arc_px.partition_point(|arc| *arc < FREE_END_PX);
-    let end = arc_px.partition_point(|arc| *arc <= length_px - FREE_END_PX);
-    &points[first.min(end)..end]
+    let end = arc_px.partition_point(|arc| *arc <= line.length() - FREE_END_PX);
+    &line.points()[first.min(end)..end]
 }
 
-/// Largest distance of a point from the nearest of others.
-fn farthest(points: &[Vector2<f64>], others: &[Vector2<f64>]) -> f64 {
-    let nearest = |p: &Vector2<f64>| {
-        others.iter().map(|o| (p - o).norm_squared()).fold(f64::INFINITY, f64::min)
+/// Largest distance of a point from the nearest point of a line.
+fn farthest(points: &[Point2], line: &Polyline2) -> f64 {
+    let nearest = |p: &Point2| {
+        line.points().iter().map(|o| (p - o).norm_squared()).fold(f64::INFINITY, f64::min)
     };
     points.iter().map(nearest).fold(0.0, f64::max).sqrt()
 }

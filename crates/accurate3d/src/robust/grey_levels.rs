@@ -16,14 +16,14 @@ const MOST_RADIUS_PX: f64 = 1.35;
 /// deviations it is a drawing, and the edges are exact.
 const MOST_CONTRAST_TO_NOISE: f64 = 1000.0;
 
-/// The curve fitted on to the grey levels of the images that its maps were made of, and what came of
+/// Fits the curve on to the grey levels of the images that its maps were made of, and says what came of
 /// it. Where that fails, or is carried off, or the body is no thin one, the curve stays as it was.
 pub(crate) fn on_grey_levels(
-    mut result: JointResult,
+    result: &mut JointResult,
     images: &[Array2<f32>; 2],
     given_rig: &Rig,
     params: &RobustParams,
-) -> (JointResult, IntensityDiagnostics) {
+) -> IntensityDiagnostics {
     let start = &result.fit.curve;
     // Under the cameras that the curve was fitted under, and no others.
     let calibration = params.calibration.as_ref().zip(result.calibration.as_ref());
@@ -39,7 +39,7 @@ pub(crate) fn on_grey_levels(
         result.fit.covariance = Some(covariance);
         result.calibration = calibration;
     }
-    (result, diagnostics)
+    diagnostics
 }
 
 impl IntensityDiagnostics {
