@@ -3,7 +3,9 @@
 
 mod support;
 
-use accurate_fit::{CalibrationPriors, FitError, IntensityFitParams, fit_intensities};
+use accurate_fit::{
+    CalibrationPriors, FitError, IntensityFitParams, IntensityPair, fit_intensities,
+};
 use accurate_geom::{Camera, Curve3, Rig};
 use accurate_synth::{
     CaseOptions, Family, SynthCase, XrayOptions, XrayResponse, generate, render_xray,
@@ -95,6 +97,43 @@ fn a_shift_of_the_second_picture_is_found_across_the_epipolar_lines() {
     assert!(found.observed_sigma_px < 0.1, "{found:?}");
     // Grey levels between the blots' shape and the cylinder's: a tenth of a pixel besides noise.
     assert!(off.abs() < 5.0 * found.observed_sigma_px + 0.1, "{off} {found:?}");
+}
+
+#[test]
+fn pictures_tell_a_curve_that_runs_back_over_itself_from_the_body() {
+    let case = generate(Family::Carm, SEED, 1, &CaseOptions::default()).unwrap();
+    let clear = XrayOptions { dose_photons_per_px: 1e5, background: 0.0, ..XrayOptions::default() };
+    let images = render_xray(&case, &clear).map(|image| image.mapv(f32::from));
+    let params = IntensityFitParams::DEFAULT;
+    let whole = curve_through(&case.truth);
+    // The body up to the tip and 25 px back: to a mask it is the same.
+    let step_px = (case.truth[1] - case.truth[0]).norm() * px_per_unit(&case);
+    let back = case.truth.iter().rev().skip(1).take((25.0 / step_px) as usize);
+    let folded: Vec<_> = case.truth.iter().chain(back).copied().collect();
+    let folded = curve_through(&folded);
+    // What no camera can see is passed over, and refused when it is fitted.
+    let behind: Vec<_> =
+        case.truth.iter().map(|p| p + (p - case.rig.camera1().centre()) * -3.0).collect();
+    let behind = curve_through(&behind);
+
+    let alone = IntensityPair::around(&[&whole], &images, &case.rig, &params, None).unwrap();
+    let alone = alone.fit(&whole).unwrap();
+    let by_itself = fit_intensities(&whole, &images, &case.rig, &params, None).unwrap();
+    assert_eq!(alone.curve, by_itself.curve);
+    assert_eq!(alone.cost, by_itself.cost);
+
+    let curves = [&whole, &behind, &folded];
+    let pair = IntensityPair::around(&curves, &images, &case.rig, &params, None).unwrap();
+    assert!(
+        matches!(pair.fit(&behind), Err(FitError::NotInFront { .. })),
+        "{:?}",
+        pair.fit(&behind)
+    );
+    let (whole, folded) = (pair.fit(&whole).unwrap(), pair.fit(&folded).unwrap());
+    // Twice the darkness along 25 px, over a width of 3 px, in both views, however the amplitude shares it:
+    // at Cauchy's scale of 3 noises a pixel so far off costs 4.5 ln 2 at least.
+    let least = 2.0 * 25.0 * 3.0 * 4.5 * 2f64.ln() * 0.25;
+    assert!(folded.cost - whole.cost > least, "{} {}", folded.cost, whole.cost);
 }
 
 #[test]

@@ -144,6 +144,9 @@ pub struct OutlineDiagnostics {
 pub struct IntensityDiagnostics {
     /// Why the curve stayed as it was; none if it is the one that explains the grey levels.
     pub refusal: Option<String>,
+    /// By how much the pictures speak for this curve and against the one that the maps had made the
+    /// likeliest, as a score; none if they agree.
+    pub overruled_by: Option<f64>,
     /// Farthest that the curve was moved in either image, its ends aside, px.
     pub moved_px: Option<f64>,
     /// Darkest that the body is drawn in each view, in standard deviations of the noise around it.
@@ -156,7 +159,6 @@ impl Diagnostics {
     pub(crate) fn of_joint(
         result: &JointResult,
         strays_px: [usize; 2],
-        grey_levels: Option<IntensityDiagnostics>,
         along_epipolar_line: &[bool],
     ) -> Self {
         let judgement = &result.fit.judgement;
@@ -179,7 +181,7 @@ impl Diagnostics {
                 strays_px,
                 evidence: result.evidence,
             }),
-            grey_levels,
+            grey_levels: result.grey_levels.clone(),
             calibration: result.calibration.as_ref().map(CalibrationDiagnostics::from),
             not_adjusted: None,
             points_fit: None,

@@ -10,7 +10,7 @@ use ndarray::Array2;
 
 use crate::direction::runs_against;
 use crate::ordered_points::adjusted_points;
-use crate::robust::{on_grey_levels, reconstruct_masks, without_strays};
+use crate::robust::{reconstruct_masks, without_strays};
 use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled, sampled_ring};
 use crate::{
     Diagnostics, Error, Explanation, InputKind, Method, Reconstruction, RobustParams, Traces,
@@ -204,12 +204,12 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         ..params.robust
     };
     let maps = maps.filter(|_| params.robust.by_probability);
-    let mut result = reconstruct_masks(masks, maps, &pair.rig, &robust, params.closure, &pair.id)?;
     let images = pair
         .images
         .as_ref()
         .filter(|_| !drawn && params.robust.by_grey_levels && params.closure == Closure::Open);
-    let grey_levels = images.map(|images| on_grey_levels(&mut result, images, &pair.rig, &robust));
+    let result =
+        reconstruct_masks(masks, maps, images, &pair.rig, &robust, params.closure, &pair.id)?;
     // The curve was fitted under the corrected camera, if one was asked for.
     let rig = match &result.calibration {
         Some(calibration) => &calibration
@@ -225,8 +225,7 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         sampling(&result.fit.curve, result.fit.covariance.as_ref(), rig);
     let along_epipolar_line = along_epipolar_lines(&points, rig)
         .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;
-    let mut diagnostics =
-        Diagnostics::of_joint(&result, strays_px, grey_levels, &along_epipolar_line);
+    let mut diagnostics = Diagnostics::of_joint(&result, strays_px, &along_epipolar_line);
     diagnostics.closed = params.closure == Closure::Closed;
     let explanation = result.explanation.clone();
     Ok(Reconstruction {

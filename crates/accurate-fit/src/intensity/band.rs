@@ -13,6 +13,7 @@ const DARKEST: f64 = 0.02;
 const MAD_TO_SIGMA: f64 = 1.4826;
 
 /// The pixels of one view near the curve, and what of their optical depth is not background.
+#[derive(Debug)]
 pub(crate) struct Band {
     /// Column and row of the first pixel of `index`.
     origin: [i64; 2],

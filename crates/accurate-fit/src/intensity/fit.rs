@@ -103,6 +103,9 @@ pub struct IntensityFit {
     /// Farthest that a point of the fitted curve lies from the start, or of the start from the fitted
     /// curve, in either image, px; the last 8 px at their ends aside, which are there to be moved.
     pub moved_px: f64,
+    /// What the fit leaves unexplained of the pictures, and its priors: half squares of standard
+    /// deviations, robust. Of fits by the same [`IntensityPair`] the least is the likeliest.
+    pub cost: f64,
     /// Levenberg-Marquardt steps taken.
     pub steps: usize,
     /// Whether the last step was below the tolerance.
@@ -141,51 +144,122 @@ pub fn fit_intensities(
     params: &IntensityFitParams,
     calibration: Option<(&CalibrationPriors, [f64; 3])>,
 ) -> Result<IntensityFit, FitError> {
-    params.validate()?;
-    if let Some((priors, _)) = calibration {
-        priors.validate()?;
-    }
-    let mut projectors = Projector::pair(rig);
-    let nuisance = calibration
-        .map_or(Nuisance::default(), |(_, [x, y, roll])| Nuisance { shift_px: [x, y], roll });
-    projectors[1].set_nuisance(nuisance);
-    let given = dense_points(start);
-    let scale = px_per_unit(&given, &projectors)?;
-    let points = continued(&given, params.extension_px / scale, DIRECTION_PX / scale);
-    let length_px = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>() * scale;
-    let spans = spans_for(length_px, params.knot_spacing_px)?.max(5);
-    if spans > MOST_SPANS {
-        return Err(FitError::BadLength { length_px });
-    }
-    let spline = UniformSpline::through(&points, spans)?;
-    let samples = (length_px * SAMPLES_PER_PX).ceil() as usize;
+    IntensityPair::around(&[start], images, rig, params, calibration)?.fit(start)
+}
 
-    let before = [0, 1].map(|v| shown(&spline, samples, &projectors[v]));
-    let bands = [
-        Band::new(&images[0], &before[0], 1, params)?,
-        Band::new(&images[1], &before[1], 2, params)?,
-    ];
-    let problem = Problem {
-        bands,
-        samples,
-        lambda3: params.lambda3 * scale * scale,
-        cauchy_scale: params.cauchy_scale,
-        prior_weights: calibration.map(|(priors, _)| priors.weights(1.0)),
-    };
-    let mut state =
-        State { spline, projectors, nuisance, amplitude: [0.0; 2], blur_px: [BLUR_PX; 2] };
-    for view in 0..2 {
-        state.amplitude[view] = problem
-            .first_amplitude(&state, view)
-            .ok_or(FitError::NotSeenInImage { view: view as u8 + 1 })?;
+/// Both pictures around curves that may explain them: what fits leave unexplained of the same pixels
+/// can be compared.
+#[derive(Debug)]
+pub struct IntensityPair {
+    params: IntensityFitParams,
+    priors: Option<CalibrationPriors>,
+    nuisance: Nuisance,
+    projectors: [Projector; 2],
+    bands: [Band; 2],
+}
+
+impl IntensityPair {
+    /// The pixels near any of the curves; parameters as of [`fit_intensities`]. What is no usable start
+    /// is passed over here and refused by [`IntensityPair::fit`].
+    ///
+    /// # Errors
+    /// As [`fit_intensities`].
+    pub fn around(
+        curves: &[&Curve3],
+        images: &[Array2<f32>; 2],
+        rig: &Rig,
+        params: &IntensityFitParams,
+        calibration: Option<(&CalibrationPriors, [f64; 3])>,
+    ) -> Result<Self, FitError> {
+        params.validate()?;
+        if let Some((priors, _)) = calibration {
+            priors.validate()?;
+        }
+        let mut projectors = Projector::pair(rig);
+        let nuisance = calibration
+            .map_or(Nuisance::default(), |(_, [x, y, roll])| Nuisance { shift_px: [x, y], roll });
+        projectors[1].set_nuisance(nuisance);
+        let mut points = [Vec::new(), Vec::new()];
+        for curve in curves {
+            let Ok(start) = Start::new(curve, &projectors, params) else { continue };
+            for (points, projector) in points.iter_mut().zip(&projectors) {
+                points.extend(shown(&start.spline, start.samples, projector));
+            }
+        }
+        let bands = [
+            Band::new(&images[0], &points[0], 1, params)?,
+            Band::new(&images[1], &points[1], 2, params)?,
+        ];
+        let priors = calibration.map(|(priors, _)| *priors);
+        Ok(Self { params: *params, priors, nuisance, projectors, bands })
     }
-    let (steps, converged) = problem.minimise(&mut state, params)?;
-    problem.finish(&state, &given, steps, converged)
+
+    /// Fits a curve, one of those that the pair is around or near them.
+    ///
+    /// # Errors
+    /// As [`fit_intensities`].
+    pub fn fit(&self, start: &Curve3) -> Result<IntensityFit, FitError> {
+        let Start { given, spline, samples, scale } =
+            Start::new(start, &self.projectors, &self.params)?;
+        let problem = Problem {
+            bands: &self.bands,
+            samples,
+            lambda3: self.params.lambda3 * scale * scale,
+            cauchy_scale: self.params.cauchy_scale,
+            prior_weights: self.priors.map(|priors| priors.weights(1.0)),
+        };
+        let mut state = State {
+            spline,
+            projectors: self.projectors.clone(),
+            nuisance: self.nuisance,
+            amplitude: [0.0; 2],
+            blur_px: [BLUR_PX; 2],
+        };
+        for view in 0..2 {
+            state.amplitude[view] = problem
+                .first_amplitude(&state, view)
+                .ok_or(FitError::NotSeenInImage { view: view as u8 + 1 })?;
+        }
+        let (steps, converged) = problem.minimise(&mut state, &self.params)?;
+        problem.finish(&state, &given, steps, converged)
+    }
+}
+
+/// Where a fit starts.
+struct Start {
+    /// The curve as it was given.
+    given: Vec<Point3>,
+    /// The curve, continued at its ends.
+    spline: UniformSpline,
+    /// Pieces that it is drawn with.
+    samples: usize,
+    /// Pixels per world unit.
+    scale: f64,
+}
+
+impl Start {
+    fn new(
+        curve: &Curve3,
+        projectors: &[Projector; 2],
+        params: &IntensityFitParams,
+    ) -> Result<Self, FitError> {
+        let given = dense_points(curve);
+        let scale = px_per_unit(&given, projectors)?;
+        let points = continued(&given, params.extension_px / scale, DIRECTION_PX / scale);
+        let length_px = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>() * scale;
+        let spans = spans_for(length_px, params.knot_spacing_px)?.max(5);
+        if spans > MOST_SPANS {
+            return Err(FitError::BadLength { length_px });
+        }
+        let spline = UniformSpline::through(&points, spans)?;
+        let samples = (length_px * SAMPLES_PER_PX).ceil() as usize;
+        Ok(Self { given, spline, samples, scale })
+    }
 }
 
 /// Everything that stays the same while the curve moves.
-struct Problem {
-    bands: [Band; 2],
+struct Problem<'a> {
+    bands: &'a [Band; 2],
     samples: usize,
     lambda3: f64,
     cauchy_scale: f64,
@@ -222,7 +296,7 @@ impl State {
     }
 }
 
-impl Problem {
+impl Problem<'_> {
     fn drawing(&self, state: &State, view: usize, derivatives: bool) -> Drawing {
         let (projector, blur) = (&state.projectors[view], state.blur_px[view]);
         Drawing::new(&state.spline, self.samples, projector, blur, &self.bands[view], derivatives)
@@ -372,6 +446,7 @@ impl Problem {
         }
         let Nuisance { shift_px, roll } = state.nuisance;
         Ok(IntensityFit {
+            cost: self.cost(state),
             curve: to_curve(&state.spline)?,
             covariance: CurveCovariance::new(controls, |i, j| inverse.block(i, j)),
             calibration: self

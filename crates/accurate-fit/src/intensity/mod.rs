@@ -7,4 +7,4 @@ mod drawing;
 mod fit;
 mod smooth;
 
-pub use fit::{IntensityFit, IntensityFitParams, fit_intensities};
+pub use fit::{IntensityFit, IntensityFitParams, IntensityPair, fit_intensities};

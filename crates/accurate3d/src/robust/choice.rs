@@ -15,7 +15,8 @@ pub(crate) struct Settled {
     pub(crate) choice: Choice,
     /// Of the finalists that are close, the likeliest first, as in `choice`.
     pub(crate) fits: Vec<Candidate>,
-    pub(crate) calibration: Option<CalibrationEstimate>,
+    /// Of each of the fits, if the calibration is an unknown.
+    pub(crate) calibrations: Vec<Option<CalibrationEstimate>>,
     pub(crate) evidence: Evidence,
 }
 
@@ -40,22 +41,82 @@ impl Settled {
             .unwrap_or(0);
         choice.finalists.swap(0, first);
         fits.swap(0, first);
-        let (fit, rivals) = (&fits[0], &fits[1..]);
-        let close = rivals.iter().map(|rival| (rival.unlikeliness() - fit.unlikeliness(), rival));
-        let far = choice.finalists[fits.len()..].iter();
-        let far = far.map(|rival| (rival.score - least, rival));
-        let margin = close
-            .chain(far)
-            .filter(|(_, rival)| !rival.shape.is_like(&fit.shape, RIVAL_PX))
-            .map(|(behind, _)| behind)
-            .fold(f64::INFINITY, f64::min);
-        let [i, j] = fit.walks;
-        let mut walks = Walks::default();
-        walks.add(&view1.walks, i, view1.cut_ends(i).len() / 2);
-        walks.add(&view2.walks, j, view2.cut_ends(j).len() / 2);
-        let evidence = Evidence::new(fit, &choice.finalists[0].shape, margin, &walks, given_rig);
-        Self { fits, calibration: calibrations.swap_remove(first), evidence, choice }
+        calibrations.swap(0, first);
+        let behind = behind(&fits, &choice.finalists);
+        let evidence = evidence(&fits, &choice.finalists, &behind, given_rig, view1, view2);
+        Self { fits, calibrations, evidence, choice }
     }
+
+    /// The curves that the choice was among, the chosen first, and by how much each is less likely.
+    pub(crate) fn contenders(&self) -> (Vec<&Candidate>, Vec<f64>) {
+        let finalists = &self.choice.finalists;
+        let far = &finalists[self.fits.len()..];
+        (self.fits.iter().chain(far).collect(), behind(&self.fits, finalists))
+    }
+
+    /// Takes one of the contenders, and orders `behind` as they then are. One that had no last fit is
+    /// taken under the calibration of the one before.
+    pub(crate) fn prefer(&mut self, mut chosen: usize, behind: &mut [f64]) {
+        let finalists = &mut self.choice.finalists;
+        let next = self.fits.len();
+        if chosen >= next {
+            finalists.swap(chosen, next);
+            behind.swap(chosen, next);
+            self.fits.push(finalists[next].clone());
+            self.calibrations.push(self.calibrations[0].clone());
+            chosen = next;
+        }
+        finalists.swap(0, chosen);
+        behind.swap(0, chosen);
+        self.fits.swap(0, chosen);
+        self.calibrations.swap(0, chosen);
+    }
+
+    /// Notes by how much each of the contenders is less likely, once more is known than the maps show.
+    pub(crate) fn weigh(
+        &mut self,
+        behind: &[f64],
+        given_rig: &Rig,
+        view1: &ViewCandidates<View1>,
+        view2: &ViewCandidates<View2>,
+    ) {
+        self.evidence =
+            evidence(&self.fits, &self.choice.finalists, behind, given_rig, view1, view2);
+    }
+}
+
+/// By how much each of the finalists is less likely than the first; those that were not fitted adaptively,
+/// by their score than the best one's.
+fn behind(fits: &[Candidate], finalists: &[Candidate]) -> Vec<f64> {
+    let best = fits[0].unlikeliness();
+    let least = finalists.iter().map(|c| c.score).fold(f64::INFINITY, f64::min);
+    let close = fits.iter().map(|c| c.unlikeliness() - best);
+    close.chain(finalists[fits.len()..].iter().map(|c| c.score - least)).collect()
+}
+
+/// What bears on the choice of the first, others being so much `behind` it.
+fn evidence(
+    fits: &[Candidate],
+    finalists: &[Candidate],
+    behind: &[f64],
+    given_rig: &Rig,
+    view1: &ViewCandidates<View1>,
+    view2: &ViewCandidates<View2>,
+) -> Evidence {
+    let fit = &fits[0];
+    let margin = fits
+        .iter()
+        .chain(&finalists[fits.len()..])
+        .zip(behind)
+        .skip(1)
+        .filter(|(rival, _)| !rival.shape.is_like(&fit.shape, RIVAL_PX))
+        .map(|(_, behind)| *behind)
+        .fold(f64::INFINITY, f64::min);
+    let [i, j] = fit.walks;
+    let mut walks = Walks::default();
+    walks.add(&view1.walks, i, view1.cut_ends(i).len() / 2);
+    walks.add(&view2.walks, j, view2.cut_ends(j).len() / 2);
+    Evidence::new(fit, &finalists[0].shape, margin, &walks, given_rig)
 }
 
 pub(crate) struct Choice {

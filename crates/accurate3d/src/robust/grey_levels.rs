@@ -1,9 +1,15 @@
-use accurate_fit::{FitError, IntensityFit, IntensityFitParams, fit_intensities};
+use accurate_fit::{
+    CalibrationEstimate, CalibrationPriors, FitError, IntensityFit, IntensityFitParams,
+    IntensityPair, fit_intensities,
+};
 use accurate_geom::Rig;
 use ndarray::Array2;
 
 use super::RobustParams;
 use super::joint::JointResult;
+use super::look::Seen;
+use super::score::Candidate;
+use super::search::SAME_PX;
 use crate::IntensityDiagnostics;
 
 /// A curve of the maps is right to a few pixels or is another curve: what is carried farther than this,
@@ -16,6 +22,71 @@ const MOST_RADIUS_PX: f64 = 1.35;
 /// deviations it is a drawing, and the edges are exact.
 const MOST_CONTRAST_TO_NOISE: f64 = 1000.0;
 
+/// Half squares of a fit to grey levels for one of a score.
+const COST_PER_SCORE: f64 = 6.0;
+/// What the pictures must speak for another curve by, as a score: neighbouring pixels repeat each other.
+const LEAD: f64 = 4.0;
+/// Most curves that are asked after, the one of the maps among them.
+const MOST_ASKED: usize = 5;
+
+/// Takes another one of the curves that came into question where the pictures, in which strands that lie
+/// upon each other are darker, speak for it; by how much, if so.
+pub(crate) fn choose_by_grey_levels(
+    seen: &mut Seen,
+    images: &[Array2<f32>; 2],
+    given_rig: &Rig,
+    params: &RobustParams,
+) -> Option<f64> {
+    let (contenders, mut behind) = seen.contenders();
+    let asked = differing(&contenders, &behind);
+    if asked.len() < 2 {
+        return None;
+    }
+    let curve = |k: usize| &contenders[k].fit.curve;
+    let curves: Vec<_> = asked.iter().map(|&k| curve(k)).collect();
+    let calibration = start_of_calibration(params, seen.calibration());
+    let settings = IntensityFitParams::DEFAULT;
+    let pair = IntensityPair::around(&curves, images, given_rig, &settings, calibration).ok()?;
+    let best = pair.fit(curves[0]).ok()?;
+    let fitted_last = seen.fitted_last();
+    // One that had no last fit is placed by the pictures or not at all; alone, where the other curves are
+    // background.
+    let stands = |k: usize| {
+        k < fitted_last
+            || fit_intensities(curve(k), images, given_rig, &settings, calibration)
+                .is_ok_and(|fit| reason_against(&fit).is_none())
+    };
+    let mut known = vec![0];
+    for &k in &asked[1..] {
+        // What is carried off is no longer the curve that the maps spoke for.
+        let fit = pair.fit(curve(k)).ok().filter(|fit| fit.moved_px <= MOST_MOVED_PX);
+        let Some(fit) = fit else { continue };
+        behind[k] += (fit.cost - best.cost) / COST_PER_SCORE;
+        known.push(k);
+    }
+    known.sort_by(|&a, &b| behind[a].total_cmp(&behind[b]));
+    let chosen =
+        known.into_iter().take_while(|&k| behind[k] < -LEAD).find(|&k| stands(k)).unwrap_or(0);
+    let lead = -behind[chosen];
+    behind.iter_mut().for_each(|behind| *behind += lead);
+    seen.prefer(chosen, &mut behind, given_rig);
+    (chosen > 0).then_some(lead)
+}
+
+/// The nearest few of the contenders that are different curves, the first among them.
+fn differing(contenders: &[&Candidate], behind: &[f64]) -> Vec<usize> {
+    let mut order: Vec<_> = (1..contenders.len()).collect();
+    order.sort_by(|&a, &b| behind[a].total_cmp(&behind[b]));
+    let mut kept = vec![0];
+    for k in order {
+        let is_new = |&j: &usize| !contenders[j].shape.is_like(&contenders[k].shape, SAME_PX);
+        if kept.len() < MOST_ASKED && kept.iter().all(is_new) {
+            kept.push(k);
+        }
+    }
+    kept
+}
+
 /// Fits the curve on to the grey levels of the images that its maps were made of, and says what came of
 /// it. Where that fails, or is carried off, or the body is no thin one, the curve stays as it was.
 pub(crate) fn on_grey_levels(
@@ -23,15 +94,13 @@ pub(crate) fn on_grey_levels(
     images: &[Array2<f32>; 2],
     given_rig: &Rig,
     params: &RobustParams,
+    overruled_by: Option<f64>,
 ) -> IntensityDiagnostics {
     let start = &result.fit.curve;
-    // Under the cameras that the curve was fitted under, and no others.
-    let calibration = params.calibration.as_ref().zip(result.calibration.as_ref());
-    let calibration = calibration
-        .map(|(priors, found)| (priors, [found.shift_px[0], found.shift_px[1], found.roll_rad]));
+    let calibration = start_of_calibration(params, result.calibration.as_ref());
     let fitted =
         fit_intensities(start, images, given_rig, &IntensityFitParams::DEFAULT, calibration);
-    let diagnostics = IntensityDiagnostics::of(&fitted);
+    let diagnostics = IntensityDiagnostics { overruled_by, ..IntensityDiagnostics::of(&fitted) };
     if let (None, Ok(IntensityFit { curve, covariance, calibration, .. })) =
         (&diagnostics.refusal, fitted)
     {
@@ -42,6 +111,15 @@ pub(crate) fn on_grey_levels(
     diagnostics
 }
 
+/// Under the cameras that the curve was fitted under, and no others.
+fn start_of_calibration<'a>(
+    params: &'a RobustParams,
+    found: Option<&CalibrationEstimate>,
+) -> Option<(&'a CalibrationPriors, [f64; 3])> {
+    let (priors, found) = params.calibration.as_ref().zip(found)?;
+    Some((priors, [found.shift_px[0], found.shift_px[1], found.roll_rad]))
+}
+
 impl IntensityDiagnostics {
     fn of(fitted: &Result<IntensityFit, FitError>) -> Self {
         let fit = fitted.as_ref().ok();
@@ -50,6 +128,7 @@ impl IntensityDiagnostics {
                 Err(error) => Some(error.to_string()),
                 Ok(fit) => reason_against(fit),
             },
+            overruled_by: None,
             moved_px: fit.map(|fit| fit.moved_px),
             contrast_to_noise: fit.map(|fit| fit.contrast_to_noise),
             radius_px: fit.map(|fit| fit.radius_px),
@@ -57,8 +136,12 @@ impl IntensityDiagnostics {
     }
 }
 
+fn mean_radius_px(fit: &IntensityFit) -> f64 {
+    0.5 * (fit.radius_px[0] + fit.radius_px[1])
+}
+
 fn reason_against(fit: &IntensityFit) -> Option<String> {
-    let radius_px = 0.5 * (fit.radius_px[0] + fit.radius_px[1]);
+    let radius_px = mean_radius_px(fit);
     let contrast = fit.contrast_to_noise[0].min(fit.contrast_to_noise[1]);
     if fit.moved_px > MOST_MOVED_PX {
         Some(format!("carried off by {:.1} px, {MOST_MOVED_PX} at most", fit.moved_px))
@@ -145,5 +228,34 @@ mod tests {
         let blank = curve(&pair, true);
         assert_eq!(blank.points, by_map.points);
         assert!(refusal(&blank).contains("view 2"), "{}", refusal(&blank));
+    }
+
+    #[test]
+    fn the_pictures_overrule_the_maps_where_those_leave_a_doubt() {
+        // Two of its strands cross where both outlines leave open which goes on as which.
+        let case = generate(Family::Hard, 1904, 26, &CaseOptions::default()).unwrap();
+        let clear = XrayOptions { dose_photons_per_px: 1e5, background: 0.0, ..Default::default() };
+        let pair = pair(&case, 0.0, &clear);
+        let off =
+            |r: &Reconstruction| curve_scores(&r.positions(), &case.truth, 0.1).unwrap().overall;
+        let (by_map, by_picture) = (curve(&pair, false), curve(&pair, true));
+        let lead = by_picture.diagnostics.grey_levels.as_ref().unwrap().overruled_by.unwrap();
+        assert!(lead > 10.0, "{lead}");
+        assert!(off(&by_picture) < 0.8 * off(&by_map), "{} {}", off(&by_map), off(&by_picture));
+        // The first of the curves that came into question is the one that was taken, the next is not; 200
+        // points stand for each.
+        let distance = |k: usize| {
+            let points = &by_picture.explanation.candidates[k].points;
+            curve_scores(points, &by_picture.positions(), 0.1).unwrap().hausdorff
+        };
+        assert!(3.0 * distance(0) < distance(1), "{} {}", distance(0), distance(1));
+    }
+
+    #[test]
+    fn where_no_picture_is_asked_none_overrules() {
+        let case = generate(Family::Easy, 1904, 0, &CaseOptions::default()).unwrap();
+        let sure = curve(&pair(&case, 0.0, &XrayOptions::default()), true);
+        assert_eq!(sure.diagnostics.suspicions, []);
+        assert_eq!(sure.diagnostics.grey_levels.unwrap().overruled_by, None);
     }
 }

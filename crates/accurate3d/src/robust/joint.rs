@@ -6,9 +6,10 @@ use ndarray::Array2;
 
 use super::evidence::Evidence;
 use super::frame::Turn;
+use super::grey_levels::{choose_by_grey_levels, on_grey_levels};
 use super::look::Look;
 use super::suspicion::{Limits, Suspicion, suspicions};
-use crate::{Closure, Error, Explanation};
+use crate::{Closure, Error, Explanation, IntensityDiagnostics};
 
 /// How hard the joint choice looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,10 +125,13 @@ pub(crate) struct JointResult {
     pub(crate) evidence: Evidence,
     /// What was considered and decided.
     pub(crate) explanation: Explanation,
+    /// What came of the grey levels, if they were asked.
+    pub(crate) grey_levels: Option<IntensityDiagnostics>,
 }
 
 /// Proposes, pairs, fits, judges; by the probability maps behind the masks, where they are given. In
 /// doubt once more with the images turned, and again, until nothing speaks against the likeliest curve.
+/// At last by the grey levels of `images`, if they are given.
 ///
 /// # Errors
 /// [`Error`] of a view that shows no curve; [`Error::NoCandidate`] if no pair of walks gives one;
@@ -135,6 +139,7 @@ pub(crate) struct JointResult {
 pub(crate) fn reconstruct_masks(
     masks: &[Array2<bool>; 2],
     probabilities: Option<&[Array2<f32>; 2]>,
+    images: Option<&[Array2<f32>; 2]>,
     rig: &Rig,
     params: &RobustParams,
     closure: Closure,
@@ -156,5 +161,11 @@ pub(crate) fn reconstruct_masks(
             seen = seen.beside(other);
         }
     }
-    Ok(seen.into_result(limits))
+    let Some(images) = images else { return Ok(seen.into_result(limits)) };
+    let in_doubt = !suspicions(&seen.evidence(), limits).is_empty();
+    let overruled_by =
+        in_doubt.then(|| choose_by_grey_levels(&mut seen, images, rig, params)).flatten();
+    let mut result = seen.into_result(limits);
+    result.grey_levels = Some(on_grey_levels(&mut result, images, rig, params, overruled_by));
+    Ok(result)
 }

@@ -1,4 +1,4 @@
-use accurate_fit::OutlinePair;
+use accurate_fit::{CalibrationEstimate, OutlinePair};
 use accurate_geom::{Pixel, Rig, View1, View2};
 use ndarray::Array2;
 
@@ -55,7 +55,7 @@ impl Look<'_> {
             Ok(Settled::of(search, choice, rig, &view1, &view2))
         };
         let mut settled = settle(&search, None)?;
-        let corrected = settled.calibration.as_ref().and_then(|found| found.correct(rig).ok());
+        let corrected = settled.calibrations[0].as_ref().and_then(|found| found.correct(rig).ok());
         if let Some(corrected) = &corrected {
             search.rig = corrected;
             settled = settle(&search, None)?;
@@ -91,6 +91,28 @@ impl Seen {
         Evidence { margin, ..self.settled.evidence }
     }
 
+    /// The curves that the look chose among, the chosen first, and by how much each is less likely, as a
+    /// score.
+    pub(crate) fn contenders(&self) -> (Vec<&Candidate>, Vec<f64>) {
+        self.settled.contenders()
+    }
+
+    /// What the curves are fitted under, if the calibration is an unknown.
+    pub(crate) fn calibration(&self) -> Option<&CalibrationEstimate> {
+        self.settled.calibrations[0].as_ref()
+    }
+
+    /// The first so many of the contenders had a last fit.
+    pub(crate) fn fitted_last(&self) -> usize {
+        self.settled.fits.len()
+    }
+
+    /// Takes one of the contenders; `behind` says by how much each of them is less likely.
+    pub(crate) fn prefer(&mut self, chosen: usize, behind: &mut [f64], given_rig: &Rig) {
+        self.settled.prefer(chosen, behind);
+        self.settled.weigh(behind, given_rig, &self.view1, &self.view2);
+    }
+
     /// Other curves than the best that other looks settled on.
     fn rivals(&self) -> impl Iterator<Item = &Candidate> {
         let best = &self.settled.fits[0].shape;
@@ -103,20 +125,21 @@ impl Seen {
         let rivals = choice.finalists[fits.len()..].iter().chain(self.rivals());
         let candidates = fits.iter().chain(rivals).map(Candidate::considered).collect();
         let Self { view1, view2, settled, fits: tried, .. } = self;
-        let Settled { mut fits, calibration, .. } = settled;
+        let Settled { mut fits, mut calibrations, .. } = settled;
         let best = fits.swap_remove(0);
         let [i, j] = best.walks;
         let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
         let explanation =
             Explanation { candidates, junctions: [view1.junctions(i), view2.junctions(j)] };
         JointResult {
+            grey_levels: None,
             explanation,
             walk1: view1.walks[i].points.clone(),
             walk2: directed(&view2.walks[j].points, best.reversed),
             coverage,
             mean_distance_px: best.mean_distance_px,
             fits: tried,
-            calibration,
+            calibration: calibrations.swap_remove(0),
             suspicions: suspicions(&evidence, limits),
             evidence,
             fit: best.fit,

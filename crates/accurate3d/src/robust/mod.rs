@@ -21,7 +21,6 @@ mod strays;
 mod suspicion;
 
 pub use evidence::Evidence;
-pub(crate) use grey_levels::on_grey_levels;
 pub(crate) use joint::{JointResult, reconstruct_masks};
 pub use joint::{RobustParams, SecondLook};
 pub(crate) use strays::without_strays;
