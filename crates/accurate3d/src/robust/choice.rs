@@ -63,7 +63,7 @@ impl Settled {
             finalists.swap(chosen, next);
             behind.swap(chosen, next);
             self.fits.push(finalists[next].clone());
-            self.calibrations.push(self.calibrations[0].clone());
+            self.calibrations.push(self.calibrations[0]);
             chosen = next;
         }
         finalists.swap(0, chosen);
@@ -85,13 +85,15 @@ impl Settled {
     }
 }
 
-/// By how much each of the finalists is less likely than the first; those that were not fitted adaptively,
-/// by their score than the best one's.
+/// By how much each of the finalists is less likely than the first; those that were not fitted
+/// adaptively, by their score than the best one's.
 fn behind(fits: &[Candidate], finalists: &[Candidate]) -> Vec<f64> {
     let best = fits[0].unlikeliness();
     let least = finalists.iter().map(|c| c.score).fold(f64::INFINITY, f64::min);
-    let close = fits.iter().map(|c| c.unlikeliness() - best);
-    close.chain(finalists[fits.len()..].iter().map(|c| c.score - least)).collect()
+    // Without a last fit of the first there is nothing to compare likelihoods with.
+    let adaptive = if best.is_finite() { fits.len() } else { 0 };
+    let close = fits[..adaptive].iter().map(|c| c.unlikeliness() - best);
+    close.chain(finalists[adaptive..].iter().map(|c| c.score - least)).collect()
 }
 
 /// What bears on the choice of the first, others being so much `behind` it.
