@@ -42,8 +42,7 @@ impl Settled {
         choice.finalists.swap(0, first);
         fits.swap(0, first);
         calibrations.swap(0, first);
-        let behind = behind(&fits, &choice.finalists);
-        let evidence = evidence(&fits, &choice.finalists, &behind, given_rig, view1, view2);
+        let evidence = evidence(&fits, &choice.finalists, given_rig, view1, view2);
         Self { fits, calibrations, evidence, choice }
     }
 
@@ -54,34 +53,27 @@ impl Settled {
         (self.fits.iter().chain(far).collect(), behind(&self.fits, finalists))
     }
 
-    /// Takes one of the contenders, and orders `behind` as they then are. One that had no last fit is
-    /// taken under the calibration of the one before.
-    pub(crate) fn prefer(&mut self, mut chosen: usize, behind: &mut [f64]) {
+    /// Takes one of the contenders. One that had no last fit is taken under the calibration of the one
+    /// before.
+    pub(crate) fn prefer(
+        &mut self,
+        mut chosen: usize,
+        given_rig: &Rig,
+        view1: &ViewCandidates<View1>,
+        view2: &ViewCandidates<View2>,
+    ) {
         let finalists = &mut self.choice.finalists;
         let next = self.fits.len();
         if chosen >= next {
             finalists.swap(chosen, next);
-            behind.swap(chosen, next);
             self.fits.push(finalists[next].clone());
             self.calibrations.push(self.calibrations[0]);
             chosen = next;
         }
         finalists.swap(0, chosen);
-        behind.swap(0, chosen);
         self.fits.swap(0, chosen);
         self.calibrations.swap(0, chosen);
-    }
-
-    /// Notes by how much each of the contenders is less likely, once more is known than the maps show.
-    pub(crate) fn weigh(
-        &mut self,
-        behind: &[f64],
-        given_rig: &Rig,
-        view1: &ViewCandidates<View1>,
-        view2: &ViewCandidates<View2>,
-    ) {
-        self.evidence =
-            evidence(&self.fits, &self.choice.finalists, behind, given_rig, view1, view2);
+        self.evidence = evidence(&self.fits, finalists, given_rig, view1, view2);
     }
 }
 
@@ -96,11 +88,10 @@ fn behind(fits: &[Candidate], finalists: &[Candidate]) -> Vec<f64> {
     close.chain(finalists[adaptive..].iter().map(|c| c.score - least)).collect()
 }
 
-/// What bears on the choice of the first, others being so much `behind` it.
+/// What bears on the choice of the first.
 fn evidence(
     fits: &[Candidate],
     finalists: &[Candidate],
-    behind: &[f64],
     given_rig: &Rig,
     view1: &ViewCandidates<View1>,
     view2: &ViewCandidates<View2>,
@@ -109,10 +100,10 @@ fn evidence(
     let margin = fits
         .iter()
         .chain(&finalists[fits.len()..])
-        .zip(behind)
+        .zip(behind(fits, finalists))
         .skip(1)
         .filter(|(rival, _)| !rival.shape.is_like(&fit.shape, RIVAL_PX))
-        .map(|(_, behind)| *behind)
+        .map(|(_, behind)| behind)
         .fold(f64::INFINITY, f64::min);
     let [i, j] = fit.walks;
     let mut walks = Walks::default();

@@ -67,10 +67,11 @@ pub(crate) fn choose_by_grey_levels(
     known.sort_by(|&a, &b| behind[a].total_cmp(&behind[b]));
     let chosen =
         known.into_iter().take_while(|&k| behind[k] < -LEAD).find(|&k| stands(k)).unwrap_or(0);
-    let lead = -behind[chosen];
-    behind.iter_mut().for_each(|behind| *behind += lead);
-    seen.prefer(chosen, &mut behind, given_rig);
-    (chosen > 0).then_some(lead)
+    if chosen == 0 {
+        return None;
+    }
+    seen.prefer(chosen, given_rig);
+    Some(-behind[chosen])
 }
 
 /// The nearest few of the contenders that are different curves, the first among them.

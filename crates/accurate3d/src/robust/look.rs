@@ -107,10 +107,10 @@ impl Seen {
         self.settled.fits.len()
     }
 
-    /// Takes one of the contenders; `behind` says by how much each of them is less likely.
-    pub(crate) fn prefer(&mut self, chosen: usize, behind: &mut [f64], given_rig: &Rig) {
-        self.settled.prefer(chosen, behind);
-        self.settled.weigh(behind, given_rig, &self.view1, &self.view2);
+    /// Takes one of the contenders. Its margin stays what the maps say: where others know better there is
+    /// doubt.
+    pub(crate) fn prefer(&mut self, chosen: usize, given_rig: &Rig) {
+        self.settled.prefer(chosen, given_rig, &self.view1, &self.view2);
     }
 
     /// Other curves than the best that other looks settled on.
