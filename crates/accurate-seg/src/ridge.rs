@@ -262,8 +262,9 @@ mod tests {
                 let along = (cos * point.direction[0] + sin * point.direction[1]).abs();
                 prop_assert!(along > 0.99, "{along}");
                 // Interpolation moves an edge by at most 0.09 px (max of (f - 1/2)(1 - f)/f over the
-                // covered part f).
-                prop_assert!((point.width_px - width).abs() < 2.0 * 0.09 + 0.02, "{point:?}");
+                // covered part f); half of the ridge's own value, which between pixels is up to 0.02
+                // short of 1, by 0.01.
+                prop_assert!((point.width_px - width).abs() < 2.0 * (0.09 + 0.01), "{point:?}");
             }
             // The waves cancel over a length. An edge along the grid has none: over all widths and
             // places of such a bar the slope vanishes at most 0.0754 px from the axis (the sum over

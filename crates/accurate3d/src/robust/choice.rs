@@ -46,13 +46,6 @@ impl Settled {
         Self { fits, calibrations, evidence, choice }
     }
 
-    /// The curves that the choice was among, the chosen first, and by how much each is less likely.
-    pub(crate) fn contenders(&self) -> (Vec<&Candidate>, Vec<f64>) {
-        let finalists = &self.choice.finalists;
-        let far = &finalists[self.fits.len()..];
-        (self.fits.iter().chain(far).collect(), behind(&self.fits, finalists))
-    }
-
     /// Takes one of the contenders. One that had no last fit is taken under the calibration of the one
     /// before.
     pub(crate) fn prefer(
@@ -77,15 +70,21 @@ impl Settled {
     }
 }
 
-/// By how much each of the finalists is less likely than the first; those that were not fitted
-/// adaptively, by their score than the best one's.
-fn behind(fits: &[Candidate], finalists: &[Candidate]) -> Vec<f64> {
+/// The curves that the choice is among, the chosen first, and by how much each is less likely; those that
+/// were not fitted adaptively, by their score than the best one's.
+pub(crate) fn contenders<'a>(
+    fits: &'a [Candidate],
+    finalists: &'a [Candidate],
+) -> Vec<(&'a Candidate, f64)> {
     let best = fits[0].unlikeliness();
     let least = finalists.iter().map(|c| c.score).fold(f64::INFINITY, f64::min);
     // Without a last fit of the first there is nothing to compare likelihoods with.
-    let adaptive = if best.is_finite() { fits.len() } else { 0 };
-    let close = fits[..adaptive].iter().map(|c| c.unlikeliness() - best);
-    close.chain(finalists[adaptive..].iter().map(|c| c.score - least)).collect()
+    let behind = |k: usize, fit: &Candidate| {
+        let adaptive = k < fits.len() && best.is_finite();
+        if adaptive { fit.unlikeliness() - best } else { finalists[k].score - least }
+    };
+    let all = fits.iter().chain(&finalists[fits.len()..]);
+    all.enumerate().map(|(k, fit)| (fit, behind(k, fit))).collect()
 }
 
 /// What bears on the choice of the first.
@@ -97,10 +96,8 @@ fn evidence(
     view2: &ViewCandidates<View2>,
 ) -> Evidence {
     let fit = &fits[0];
-    let margin = fits
-        .iter()
-        .chain(&finalists[fits.len()..])
-        .zip(behind(fits, finalists))
+    let margin = contenders(fits, finalists)
+        .into_iter()
         .skip(1)
         .filter(|(rival, _)| !rival.shape.is_like(&fit.shape, RIVAL_PX))
         .map(|(_, behind)| behind)

@@ -37,12 +37,12 @@ pub(crate) fn choose_by_grey_levels(
     given_rig: &Rig,
     params: &RobustParams,
 ) -> Option<f64> {
-    let (contenders, mut behind) = seen.contenders();
-    let asked = differing(&contenders, &behind);
+    let contenders = seen.contenders();
+    let asked = differing(&contenders);
     if asked.len() < 2 {
         return None;
     }
-    let curve = |k: usize| &contenders[k].fit.curve;
+    let curve = |k: usize| &contenders[k].0.fit.curve;
     let curves: Vec<_> = asked.iter().map(|&k| curve(k)).collect();
     let calibration = start_of_calibration(params, seen.calibration());
     let settings = IntensityFitParams::DEFAULT;
@@ -56,31 +56,28 @@ pub(crate) fn choose_by_grey_levels(
             || fit_intensities(curve(k), images, given_rig, &settings, calibration)
                 .is_ok_and(|fit| reason_against(&fit).is_none())
     };
-    let mut known = vec![0];
+    let mut behind = Vec::new();
     for &k in &asked[1..] {
         // What is carried off is no longer the curve that the maps spoke for.
         let fit = pair.fit(curve(k)).ok().filter(|fit| fit.moved_px <= MOST_MOVED_PX);
         let Some(fit) = fit else { continue };
-        behind[k] += (fit.cost - best.cost) / COST_PER_SCORE;
-        known.push(k);
+        behind.push((contenders[k].1 + (fit.cost - best.cost) / COST_PER_SCORE, k));
     }
-    known.sort_by(|&a, &b| behind[a].total_cmp(&behind[b]));
-    let chosen =
-        known.into_iter().take_while(|&k| behind[k] < -LEAD).find(|&k| stands(k)).unwrap_or(0);
-    if chosen == 0 {
-        return None;
-    }
+    behind.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (behind, chosen) =
+        behind.into_iter().take_while(|(behind, _)| *behind < -LEAD).find(|&(_, k)| stands(k))?;
     seen.prefer(chosen, given_rig);
-    Some(-behind[chosen])
+    Some(-behind)
 }
 
 /// The nearest few of the contenders that are different curves, the first among them.
-fn differing(contenders: &[&Candidate], behind: &[f64]) -> Vec<usize> {
+fn differing(contenders: &[(&Candidate, f64)]) -> Vec<usize> {
+    let shape = |k: usize| &contenders[k].0.shape;
     let mut order: Vec<_> = (1..contenders.len()).collect();
-    order.sort_by(|&a, &b| behind[a].total_cmp(&behind[b]));
+    order.sort_by(|&a, &b| contenders[a].1.total_cmp(&contenders[b].1));
     let mut kept = vec![0];
     for k in order {
-        let is_new = |&j: &usize| !contenders[j].shape.is_like(&contenders[k].shape, SAME_PX);
+        let is_new = |&j: &usize| !shape(j).is_like(shape(k), SAME_PX);
         if kept.len() < MOST_ASKED && kept.iter().all(is_new) {
             kept.push(k);
         }
@@ -137,12 +134,8 @@ impl IntensityDiagnostics {
     }
 }
 
-fn mean_radius_px(fit: &IntensityFit) -> f64 {
-    0.5 * (fit.radius_px[0] + fit.radius_px[1])
-}
-
 fn reason_against(fit: &IntensityFit) -> Option<String> {
-    let radius_px = mean_radius_px(fit);
+    let radius_px = 0.5 * (fit.radius_px[0] + fit.radius_px[1]);
     let contrast = fit.contrast_to_noise[0].min(fit.contrast_to_noise[1]);
     if fit.moved_px > MOST_MOVED_PX {
         Some(format!("carried off by {:.1} px, {MOST_MOVED_PX} at most", fit.moved_px))

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use super::evidence::Evidence;
 use super::frame::Turn;
 use super::grey_levels::{choose_by_grey_levels, on_grey_levels};
-use super::look::Look;
+use super::look::{Look, Seen};
 use super::suspicion::{Limits, Suspicion, suspicions};
 use crate::{Closure, Error, Explanation, IntensityDiagnostics};
 
@@ -147,12 +147,12 @@ pub(crate) fn reconstruct_masks(
 ) -> Result<JointResult, Error> {
     let look = |turn| Look { masks, probabilities, rig, params, closure, turn, case }.look();
     let limits = if probabilities.is_some() { &Limits::MAPS } else { &Limits::MASKS };
+    let in_doubt = |seen: &Seen| !suspicions(&seen.evidence(), limits).is_empty();
     let mut seen = look(Turn::NONE)?;
     for turn in Turn::OTHERS {
-        let in_doubt = !suspicions(&seen.evidence(), limits).is_empty();
         // Every pair of closed walks has been fitted from everywhere.
         let again =
-            closure == Closure::Open && params.turned && params.second_look.is_due(in_doubt);
+            closure == Closure::Open && params.turned && params.second_look.is_due(in_doubt(&seen));
         if !again {
             break;
         }
@@ -162,9 +162,8 @@ pub(crate) fn reconstruct_masks(
         }
     }
     let Some(images) = images else { return Ok(seen.into_result(limits)) };
-    let in_doubt = !suspicions(&seen.evidence(), limits).is_empty();
     let overruled_by =
-        in_doubt.then(|| choose_by_grey_levels(&mut seen, images, rig, params)).flatten();
+        if in_doubt(&seen) { choose_by_grey_levels(&mut seen, images, rig, params) } else { None };
     let mut result = seen.into_result(limits);
     result.grey_levels = Some(on_grey_levels(&mut result, images, rig, params, overruled_by));
     Ok(result)

@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use super::RobustParams;
 use super::candidates::ViewCandidates;
-use super::choice::{RIVAL_PX, Settled, choose, choose_ring};
+use super::choice::{RIVAL_PX, Settled, choose, choose_ring, contenders};
 use super::evidence::Evidence;
 use super::frame::Turn;
 use super::joint::JointResult;
@@ -93,8 +93,8 @@ impl Seen {
 
     /// The curves that the look chose among, the chosen first, and by how much each is less likely, as a
     /// score.
-    pub(crate) fn contenders(&self) -> (Vec<&Candidate>, Vec<f64>) {
-        self.settled.contenders()
+    pub(crate) fn contenders(&self) -> Vec<(&Candidate, f64)> {
+        contenders(&self.settled.fits, &self.settled.choice.finalists)
     }
 
     /// What the curves are fitted under, if the calibration is an unknown.
