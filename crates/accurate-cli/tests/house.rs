@@ -5,6 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// For each crate of ours, the crates of ours it may depend on.
 const MAY_IMPORT: &[(&str, &[&str])] = &[
@@ -270,4 +271,39 @@ fn rust_files(dir: &Path) -> Vec<PathBuf> {
         }
     }
     files
+}
+
+/// A version `a.b` or `a.b.c`, to be compared.
+fn version(text: &str) -> Vec<u32> {
+    text.split('.').map(|part| part.parse().unwrap()).collect()
+}
+
+#[test]
+fn the_stated_rust_is_new_enough_for_every_library() {
+    let manifest: toml::Table =
+        fs::read_to_string(workspace().join("Cargo.toml")).unwrap().parse().unwrap();
+    let stated = manifest["workspace"]["package"]["rust-version"].as_str().unwrap();
+    let readme = fs::read_to_string(workspace().join("README.md")).unwrap();
+    assert!(readme.contains(&format!("Rust toolchain ({stated} or newer)")), "README: {stated}");
+
+    // For this machine only: what other systems need was not downloaded to build here.
+    let compiler = Command::new("rustc").arg("-vV").output().unwrap();
+    let compiler = String::from_utf8(compiler.stdout).unwrap();
+    let host = compiler.lines().find_map(|line| line.strip_prefix("host: ")).unwrap();
+    let metadata = Command::new(env!("CARGO"))
+        .args(["metadata", "--format-version", "1", "--locked", "--filter-platform", host])
+        .current_dir(workspace())
+        .output()
+        .unwrap();
+    assert!(metadata.status.success(), "{}", String::from_utf8_lossy(&metadata.stderr));
+    let metadata: serde_json::Value = serde_json::from_slice(&metadata.stdout).unwrap();
+    let packages = metadata["packages"].as_array().unwrap();
+    let newer: Vec<_> = packages
+        .iter()
+        .filter_map(|package| Some((package, package["rust_version"].as_str()?)))
+        .filter(|(_, needed)| version(needed) > [version(stated), vec![0]].concat())
+        .map(|(package, needed)| format!("{} needs Rust {needed}", package["name"]))
+        .collect();
+    assert!(packages.len() > 100, "{} packages", packages.len());
+    assert!(newer.is_empty(), "the workspace states {stated}: {newer:?}");
 }

@@ -33,6 +33,10 @@ pub(crate) fn resample(
     for pair in points.windows(2) {
         let step = pair[1] - pair[0];
         let step_length = step.norm();
+        // A repeated point is no step: whether a sample falls on it is a matter of rounding.
+        if step_length == 0.0 {
+            continue;
+        }
         // The last sample is the last point itself, not a rounded sum.
         while samples.len() < count {
             let wanted = length * (samples.len() as f64 / intervals) - walked;
@@ -95,5 +99,21 @@ mod tests {
         let twice = resample("c", &[p(0.0), p(0.0), p(1.0), p(1.0), p(3.0), p(3.0)], 0.5).unwrap();
         assert_eq!(once, twice);
         assert_eq!(once.len(), 7);
+    }
+
+    #[test]
+    fn points_that_stand_twice_give_no_sample_that_is_not_a_number() {
+        // Steps whose lengths are rounded: samples fall on vertices, or beside them.
+        for thirds in 1..200 {
+            let step = 0.1 * f64::from(thirds) / 3.0;
+            let p = |k: i32| Point3::new(-2.0, 2.5, 1.0) * (step * f64::from(k));
+            let once: Vec<Point3> = (0..16).map(p).collect();
+            let twice: Vec<Point3> = (0..32).map(|k| p(k / 2)).collect();
+            for spacing in [step, 0.5 * step, 0.1] {
+                let (a, b) = (resample("c", &once, spacing), resample("c", &twice, spacing));
+                assert_eq!(a, b, "{step} {spacing}");
+                assert!(b.unwrap().iter().all(|x| x.coords.iter().all(|v| v.is_finite())));
+            }
+        }
     }
 }

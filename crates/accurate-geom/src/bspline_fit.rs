@@ -10,7 +10,9 @@ use crate::{BSpline, GeomError};
 const POINTS_PER_SPAN: usize = 4;
 
 /// Range of the smoothing weight relative to the data, in powers of ten. Below the first the
-/// penalty is lost in rounding; above the second the curve is as good as a parabola.
+/// penalty is lost in rounding; above the second the data are. A curve of up to a few hundred spans is
+/// as good as a parabola there; what the penalty does to the longest waves falls with the sixth power of
+/// the spans.
 const LOG10_WEIGHT: (f64, f64) = (-14.0, 10.0);
 
 /// Step, in powers of ten, to the least weight that still bridges a gap in the data.
@@ -94,8 +96,9 @@ impl<const D: usize> BSpline<D> {
     ///
     /// Smoothness is the integral of the squared third derivative over chord length, so that
     /// parabolas cost nothing. Knots are equally spaced, one per four points, and closer where that
-    /// cannot follow the data. If even a parabola is near enough, it is the result; if the closest
-    /// possible curve is too far (only where knots as dense as the points cannot follow), that is.
+    /// cannot follow the data. If even the smoothest curve that rounding allows is near enough, it is
+    /// the result: a parabola, or beyond about a thousand points a curve of long waves only, nearer than
+    /// was asked for; if the closest possible curve is too far (only where knots as dense as the points cannot follow), that is.
     /// `sigma = 0` interpolates.
     ///
     /// # Errors

@@ -118,7 +118,9 @@ impl<const D: usize> Piece<D> {
     fn refine(&self, from: f64, to: f64, whole: f64, tolerance: f64, depth: usize) -> f64 {
         let middle = 0.5 * (from + to);
         let (left, right) = (self.quadrature(from, middle), self.quadrature(middle, to));
-        if depth == 0 || (left + right - whole).abs() <= tolerance {
+        // What overflows is no nearer the truth in halves.
+        let error = (left + right - whole).abs();
+        if depth == 0 || error <= tolerance || error.is_nan() {
             return left + right;
         }
         self.refine(from, middle, left, tolerance, depth - 1)

@@ -85,6 +85,9 @@ impl Camera {
             0.0,      1.0 / fy,       -cy / fy,
             0.0,      0.0,            1.0,
         );
+        for &value in &k_inverse {
+            finite(value, || "inverse of K".into())?;
+        }
         let r_inverse = r.try_inverse().unwrap_or_else(|| r.transpose());
         Ok(Self { k, r, t, size, k_inverse, r_inverse, distortion: None })
     }

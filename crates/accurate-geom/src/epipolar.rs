@@ -2,6 +2,7 @@ use std::marker::PhantomData;
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::error::finite;
 use crate::{Camera, GeomError, Pixel, View, View1, View2};
 
 /// The fundamental matrix that turns a pixel of view `B` into its epipolar line in view `A`:
@@ -57,19 +58,27 @@ impl<A: View, B: View> Fundamental<A, B> {
     /// The epipolar line in view `A` of a pixel of view `B`.
     ///
     /// # Errors
-    /// [`GeomError::AtEpipole`] if the pixel is the epipole of view `B`.
+    /// [`GeomError::AtEpipole`] if the pixel is the epipole of view `B`; [`GeomError::NotFinite`] if it is
+    /// NaN or so far away that its line is.
     pub fn line(&self, pixel_b: Pixel<B>) -> Result<EpipolarLine<A>, GeomError> {
         let pixel = pixel_b.homogeneous();
         let line = self.matrix * pixel;
         let normal = line.x.hypot(line.y);
         // At the epipole the terms of `F p` cancel and what is left is rounding noise, which must
         // not pass for a line: it is compared with the terms, not with itself. The second test is
-        // for the line at infinity. NaN fails both, and is refused with them.
-        let terms = self.matrix.abs() * pixel.abs();
-        if !(normal > 1e-12 * terms.x.hypot(terms.y) && normal > 1e-12 * line.norm()) {
+        // for the line at infinity.
+        let scale = self.terms(pixel_b).max(line.norm());
+        finite(scale, || format!("line of the pixel ({}, {})", pixel_b.x, pixel_b.y))?;
+        if normal <= 1e-12 * scale {
             return Err(GeomError::AtEpipole { view: B::NUMBER, x: pixel_b.x, y: pixel_b.y });
         }
         Ok(EpipolarLine { coefficients: line / normal, view: PhantomData })
+    }
+
+    /// The norm of what [`line`](Self::line) adds up for its normal: what rounding is relative to.
+    fn terms(&self, pixel_b: Pixel<B>) -> f64 {
+        let terms = self.matrix.abs() * pixel_b.homogeneous().abs();
+        terms.x.hypot(terms.y)
     }
 
     /// The algebraic residual `p_aᵀ F p_b` (no unit; depends on the scale of `F`).
@@ -136,7 +145,8 @@ pub fn symmetric_epipolar_distance(
 /// the rays meet.
 ///
 /// # Errors
-/// [`GeomError::AtEpipole`] if both pixels are epipoles (then no correction is defined).
+/// [`GeomError::AtEpipole`] if both pixels are epipoles (then no correction is defined);
+/// [`GeomError::NotFinite`] if one is NaN or too far away for a number.
 ///
 /// # Source
 /// Hartley and Zisserman, Multiple View Geometry, 2nd ed., eq. 11.9.
@@ -148,7 +158,11 @@ pub fn sampson_distance(
     let line1 = f.matrix() * p2.homogeneous();
     let line2 = f.matrix().transpose() * p1.homogeneous();
     let gradient = line1.x.hypot(line1.y).hypot(line2.x.hypot(line2.y));
-    if !(gradient > 1e-12 * line1.norm().hypot(line2.norm())) {
+    // As for a line: what is left of terms that cancel is no gradient.
+    let terms = f.terms(p2).hypot(f.transpose().terms(p1));
+    let scale = terms.max(line1.norm().hypot(line2.norm()));
+    finite(scale, || "epipolar lines of two pixels".into())?;
+    if gradient <= 1e-12 * scale {
         return Err(GeomError::AtEpipole { view: 2, x: p2.x, y: p2.y });
     }
     Ok(p1.homogeneous().dot(&line1).abs() / gradient)

@@ -110,8 +110,12 @@ impl<const D: usize> Polyline<D> {
     /// point only.
     ///
     /// # Errors
-    /// None in practice: [`GeomError::NotFinite`] would need overflow that the constructor refused.
+    /// [`GeomError::OutOfRange`] for a `count` above 10⁸.
     pub fn resample_to(&self, count: usize) -> Result<Self, GeomError> {
+        if count > MAX_RESAMPLED as usize + 1 {
+            let (what, expected) = ("count", "at most 1e8 points");
+            return Err(GeomError::OutOfRange { what, value: count as f64, expected });
+        }
         if count < 2 {
             return Self::new(vec![self.points[0]]);
         }

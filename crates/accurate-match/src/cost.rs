@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use accurate_geom::{Fundamental, Pixel, View, View1, View2};
+use accurate_geom::{Fundamental, GeomError, Pixel, View, View1, View2};
 use pulp::{Arch, NullaryFnOnce};
 
 use crate::MatchError;
@@ -55,7 +55,7 @@ impl CostModel {
     /// # Errors
     /// [`MatchError::Empty`] or [`MatchError::NotFinite`] for an unusable curve;
     /// [`MatchError::Geometry`] if a pixel's ray cannot be seen in a view that `kind` measures in
-    /// (its epipolar plane is parallel to that image).
+    /// (its epipolar plane is parallel to that image, or the pixel is too far away for a number).
     ///
     /// # Cost
     /// O(n1 + n2) time and memory.
@@ -67,6 +67,8 @@ impl CostModel {
     ) -> Result<Self, MatchError> {
         validate_curve(curve1)?;
         validate_curve(curve2)?;
+        let gradients1 = squared_gradients(f, curve2, kind)?;
+        let gradients2 = squared_gradients(&f.transpose(), curve1, kind)?;
         let images1 = images(f, curve2, kind != DistanceKind::View2)?;
         let images2 = images(&f.transpose(), curve1, kind != DistanceKind::View1)?;
         let mut lines1 =
@@ -87,8 +89,8 @@ impl CostModel {
             images2,
             lines1,
             lineless2,
-            gradients1: squared_gradients(f, curve2),
-            gradients2: squared_gradients(&f.transpose(), curve1),
+            gradients1,
+            gradients2,
             curve1: curve1.to_vec(),
             curve2: curve2.to_vec(),
         })
@@ -293,8 +295,20 @@ fn images<A: View, B: View>(
     curve.iter().map(image).collect()
 }
 
-fn squared_gradients<A: View, B: View>(f: &Fundamental<A, B>, curve: &[Pixel<B>]) -> Vec<f64> {
-    let squared = |pixel: &Pixel<B>| (f.matrix() * pixel.homogeneous()).xy().norm_squared();
+/// Refuses, where `kind` needs them, those of which two do not add up to a number.
+fn squared_gradients<A: View, B: View>(
+    f: &Fundamental<A, B>,
+    curve: &[Pixel<B>],
+    kind: DistanceKind,
+) -> Result<Vec<f64>, GeomError> {
+    let squared = |pixel: &Pixel<B>| {
+        let value = (f.matrix() * pixel.homogeneous()).xy().norm_squared();
+        if kind == DistanceKind::Sampson && !(2.0 * value).is_finite() {
+            let what = format!("squared gradient at the pixel ({}, {})", pixel.x, pixel.y);
+            return Err(GeomError::NotFinite { what, value });
+        }
+        Ok(value)
+    };
     curve.iter().map(squared).collect()
 }
 

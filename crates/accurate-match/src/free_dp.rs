@@ -98,7 +98,7 @@ pub struct FreeAlignment {
 /// and Chiba 1978.
 ///
 /// # Cost
-/// O(n1·n2) time, 1 byte per cell and 56 bytes per column of memory.
+/// O(n1·n2) time, 1 byte per cell, 16 per row and 56 per column of memory.
 pub fn align_free(
     n1: usize,
     n2: usize,
@@ -113,7 +113,8 @@ pub fn align_free(
         }
     }
     let fill = |i: usize, _: Range<usize>, row: &mut [f64]| fill_row(i, row);
-    sweep(n1, n2, fill, prices, ends, |_| 0..n2)?.ok_or(MatchError::NoFinitePath { n1, n2 })
+    let cells = (n1 as u64).saturating_mul(n2 as u64);
+    sweep(n1, n2, fill, prices, ends, cells, |_| 0..n2)?.ok_or(MatchError::NoFinitePath { n1, n2 })
 }
 
 /// As [`align_free`] on the table of `costs`, but only the part of it is looked at that lies near the
@@ -124,7 +125,7 @@ pub fn align_free(
 /// As [`align_free`]; also if no path lies there.
 ///
 /// # Cost
-/// O(n1·n2 / 64 + 32·n1) time, 1 byte per cell of memory.
+/// O(n1·n2 / 64 + 32·n1) time, 1 byte of memory per cell that is looked at.
 pub(crate) fn align_free_near(
     costs: &CostModel,
     prices: &MovePrices,
@@ -151,10 +152,13 @@ pub(crate) fn align_free_near(
         end2: ends.end2.div_ceil(BLOCK),
     };
     let no_path = MatchError::NoFinitePath { n1, n2 };
-    let coarse = sweep(blocks1, blocks2, fill_blocks, prices, &block_ends, |_| 0..blocks2)?;
-    let near = near_path(&coarse.ok_or_else(|| no_path.clone())?.path, n1, n2);
+    let blocks = (blocks1 as u64).saturating_mul(blocks2 as u64);
+    let coarse = sweep(blocks1, blocks2, fill_blocks, prices, &block_ends, blocks, |_| 0..blocks2)?;
+    let mut near = near_path(&coarse.ok_or_else(|| no_path.clone())?.path, n1, n2);
+    near[0] = 0..n2;
+    let cells = near.iter().map(|columns| columns.len() as u64).sum();
     let fill = |i: usize, columns, part: &mut [f64]| costs.fill_part(i, columns, part);
-    sweep(n1, n2, fill, prices, ends, |i| near[i].clone())?.ok_or(no_path)
+    sweep(n1, n2, fill, prices, ends, cells, |i| near[i].clone())?.ok_or(no_path)
 }
 
 /// Signed costs of point `i` (the last if there are fewer) and the first point of every block, and the
@@ -194,17 +198,18 @@ fn near_path(path: &[(usize, usize)], n1: usize, n2: usize) -> Vec<Range<usize>>
     near
 }
 
-/// The cheapest path through the given columns of each row, if there is one. The first row is looked at
-/// as a whole.
+/// The cheapest path through the given columns of each row, all of the first, `cells` together; if there
+/// is one.
 fn sweep(
     n1: usize,
     n2: usize,
     mut fill_row: impl FnMut(usize, Range<usize>, &mut [f64]),
     prices: &MovePrices,
     ends: &OpenEnds,
+    cells: u64,
     columns_of: impl Fn(usize) -> Range<usize>,
 ) -> Result<Option<FreeAlignment>, MatchError> {
-    let mut codes = Codes::with_room_for(n1, n2)?;
+    let mut codes = Codes::with_room_for(cells, n1, n2)?;
     let gaps = (prices.gap_open + prices.gap_skip).is_finite();
     let skip = |samples: usize| if samples == 0 { 0.0 } else { samples as f64 * prices.end_skip };
     let begin = |samples: usize, free: usize| {
@@ -217,10 +222,10 @@ fn sweep(
     let mut best = f64::INFINITY;
     let mut last = None;
     for i in 0..n1 {
-        let columns = if i == 0 { 0..n2 } else { columns_of(i) };
+        let columns = columns_of(i);
         fill_row(i, columns.clone(), &mut costs[columns.clone()]);
         refuse_invalid(i, columns.start, &costs[columns.clone()])?;
-        let row = codes.push_row();
+        let row = codes.push_row(&columns);
         current.columns = columns;
         if i == 0 {
             first_row(&costs, &mut current, row, prices, gaps, |j| begin(j, ends.begin2));
@@ -318,8 +323,8 @@ fn first_row(
     }
 }
 
-/// The columns of one row of the recurrence below the first. `start` is the cost of beginning in
-/// column 0.
+/// The columns of one row of the recurrence below the first, and their `codes`. `start` is the cost of
+/// beginning in column 0.
 fn next_row<const GAPS: bool>(
     costs: &[f64],
     above: &States,
@@ -353,10 +358,11 @@ fn next_row<const GAPS: bool>(
         }
         codes[0] = code;
     }
+    let codes = &mut codes[first.max(1) - first..];
     let first = first.max(1);
     // Slices of one length: no bounds checks in the loop.
     let n = end - first;
-    let (costs, codes) = (&costs[first..end], &mut codes[first..end]);
+    let (costs, codes) = (&costs[first..end], &mut codes[..n]);
     let (matched_before, matched_above) =
         (&above.matched[first - 1..][..n], &above.matched[first..end]);
     let (gap1_before, gap1_above) = (&above.gap1[first - 1..][..n], &above.gap1[first..end]);
@@ -412,34 +418,37 @@ fn refuse_invalid(i: usize, first: usize, costs: &[f64]) -> Result<(), MatchErro
     }
 }
 
-/// How each cell was reached, one byte per cell.
+/// How each cell that is looked at was reached, one byte per cell.
 struct Codes {
     bytes: Vec<u8>,
-    n2: usize,
+    /// Of each row, where it begins among the bytes, and with which column.
+    rows: Vec<(usize, usize)>,
 }
 
 impl Codes {
-    fn with_room_for(n1: usize, n2: usize) -> Result<Self, MatchError> {
-        let table = (n1 as u64).saturating_mul(n2 as u64);
-        let bytes = table.saturating_add((n2 as u64).saturating_mul(56));
+    fn with_room_for(cells: u64, n1: usize, n2: usize) -> Result<Self, MatchError> {
+        let (rows, columns) = ((n1 as u64).saturating_mul(16), (n2 as u64).saturating_mul(56));
+        let bytes = cells.saturating_add(rows).saturating_add(columns);
         if bytes > MAX_ALIGNMENT_BYTES {
             return Err(MatchError::TooLarge { n1, n2, bytes, limit_bytes: MAX_ALIGNMENT_BYTES });
         }
         let refused = MatchError::OutOfMemory { n1, n2, bytes };
-        let Ok(room) = usize::try_from(table) else { return Err(refused) };
+        let Ok(room) = usize::try_from(cells) else { return Err(refused) };
         let mut table = Vec::new();
         table.try_reserve_exact(room).map_err(|_| refused)?;
-        Ok(Self { bytes: table, n2 })
+        Ok(Self { bytes: table, rows: Vec::with_capacity(n1) })
     }
 
-    fn push_row(&mut self) -> &mut [u8] {
+    fn push_row(&mut self, columns: &Range<usize>) -> &mut [u8] {
         let from = self.bytes.len();
-        self.bytes.resize(from + self.n2, START);
+        self.rows.push((from, columns.start));
+        self.bytes.resize(from + columns.len(), START);
         &mut self.bytes[from..]
     }
 
     fn get(&self, i: usize, j: usize) -> u8 {
-        self.bytes[i * self.n2 + j]
+        let (from, first) = self.rows[i];
+        self.bytes[from + j - first]
     }
 
     fn trace(&self, last: (usize, usize)) -> Vec<(usize, usize)> {

@@ -277,6 +277,8 @@ impl FreeMatcher {
                     pixel1: pixel_at(curve1, at1),
                     pixel2: pixel_at(curve2, at2),
                 });
+                // A ring's last sample is its first again.
+                let at1 = if found.closed { at1 % (curve1.len() - 1) as f64 } else { at1 };
                 positions.push((at1, found.given_position(at2, n2)));
                 flags.push(flag);
             }

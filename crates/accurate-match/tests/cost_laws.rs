@@ -233,10 +233,16 @@ fn huge_pixels_give_large_costs_or_an_error_never_nan() {
     for size in [1e9, 1e100, 1e200, 1e308] {
         let (c1, c2) = ([Pixel::new(size, -size)], [Pixel::new(-size, 0.3 * size)]);
         for kind in KINDS {
-            if let Ok(costs) = CostModel::new(rig.fundamental(), &c1, &c2, kind) {
-                let aligned =
-                    align_rows(1, 1, |i, row| costs.fill_row(i, row), TieOrder::DiagonalFirst);
-                assert!(aligned.is_err() || aligned.unwrap().total_cost.is_finite());
+            // Both pixels lie as far from the other's line as they lie from their images.
+            match CostModel::new(rig.fundamental(), &c1, &c2, kind) {
+                Ok(costs) => {
+                    let cost = costs.cost(0, 0);
+                    assert!(cost.is_finite() && cost > 1e-3 * size, "{size} {kind:?}: {cost}");
+                    let aligned =
+                        align_rows(1, 1, |i, row| costs.fill_row(i, row), TieOrder::DiagonalFirst);
+                    assert_eq!(aligned.unwrap().total_cost, cost);
+                }
+                Err(error) => assert!(size > 1e150, "{size} {kind:?}: {error}"),
             }
         }
     }

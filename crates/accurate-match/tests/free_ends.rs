@@ -244,6 +244,14 @@ proptest! {
             .unwrap();
         prop_assert!(found.mean_cost_px <= 2.0 * DISTANCE_TOLERANCE_PX, "{}", found.mean_cost_px);
         prop_assert_eq!((found.matched1.clone(), found.matched2.clone()), (0..n, 0..n));
+        for ((i, j), (at1, at2)) in found.pairs.iter().zip(&found.positions) {
+            let apart = |at: f64, k: usize| {
+                let apart = (at - k as f64).abs();
+                apart.min(n as f64 - apart)
+            };
+            prop_assert!((0.0..n as f64).contains(at1) && apart(*at1, *i) <= 0.5 + 1e-9, "{} {}", at1, i);
+            prop_assert!((0.0..n as f64).contains(at2) && apart(*at2, *j) <= 0.5 + 1e-9, "{} {}", at2, j);
+        }
         // Both senses of a ring may explain exact samples only if every sample pair does.
         if found.margin_px.unwrap() > 1e-6 {
             prop_assert_eq!(found.reversed, backwards);

@@ -14,7 +14,7 @@ pub struct EvalArgs {
     #[arg(long, value_name = "FILE")]
     pub truth: PathBuf,
     /// Arc length between the samples of the point-to-polyline scores, in the curve's unit
-    /// (default: a 4000th of the truth's length).
+    /// (default: a 4000th of the truth's length; more where the curve is over ten times as long).
     #[arg(long, value_name = "LENGTH")]
     pub spacing: Option<f64>,
     /// Pair folder whose cameras give reprojection errors in px.

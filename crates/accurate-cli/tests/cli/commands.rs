@@ -179,6 +179,33 @@ fn eval_agrees_with_the_scores_of_the_reconstruction() {
 }
 
 #[test]
+fn a_curve_in_disorder_and_points_that_stand_twice_are_scored() {
+    let dir = TempDir::new().unwrap();
+    let write = |name: &str, order: &mut dyn Iterator<Item = usize>| {
+        let path = dir.path().join(name);
+        let row = |k: usize| {
+            let t = 0.2 * k as f64;
+            format!("{},{},{}\n", -t, 1.25 * t, 0.5 * t)
+        };
+        let rows: String = order.map(row).collect();
+        std::fs::write(&path, format!("x,y,z\n{rows}")).unwrap();
+        path
+    };
+    let truth = write("truth.csv", &mut (0..400));
+    let twice = write("twice.csv", &mut (0..800).map(|k| k / 2));
+    // 37 and 400 have no common factor: every point once.
+    let disorder = write("disorder.csv", &mut (0..400).map(|k| 37 * k % 400));
+    for (curve, frechet) in [(twice, 0.0..1e-9), (disorder, 50.0..200.0)] {
+        let text = stdout(accurate().arg("eval").arg(curve).arg("--truth").arg(&truth));
+        let scores: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(scores["overall"].as_f64().unwrap(), 0.0);
+        let polyline = &scores["polyline"];
+        assert!(polyline["overall"].as_f64().unwrap() < 1e-9, "{text}");
+        assert!(frechet.contains(&polyline["frechet"].as_f64().unwrap()), "{text}");
+    }
+}
+
+#[test]
 fn demo_writes_everything_and_scores_it() {
     let dir = TempDir::new().unwrap();
     let text = stdout(accurate().args(["demo", "--out"]).arg(dir.path()));

@@ -50,6 +50,24 @@ proptest! {
         let epipole2 = Pixel::new(e.x / e.z, e.y / e.z);
         let refused = scene.rig.fundamental().line(epipole2);
         prop_assert!(matches!(refused, Err(GeomError::AtEpipole { view: 2, .. })), "{refused:?}");
+        let e = c1.projection_matrix() * c2.centre().to_homogeneous();
+        prop_assume!(e.z.abs() > 1e-3 * e.norm() / c1.k()[(0, 0)].abs());
+        let epipole1 = Pixel::new(e.x / e.z, e.y / e.z);
+        let refused = sampson_distance(scene.rig.fundamental(), epipole1, epipole2);
+        prop_assert!(matches!(refused, Err(GeomError::AtEpipole { .. })), "{refused:?}");
+    }
+
+    /// A far pixel is not the epipole, and no line comes from what overflows.
+    #[test]
+    fn a_pixel_beyond_numbers_is_refused_as_such(scene in scenes(), size in 160.0..308.0f64) {
+        let far = 10f64.powf(size);
+        let f = scene.rig.fundamental();
+        for x in [far, f64::NAN, f64::INFINITY] {
+            let refused = f.line(Pixel::new(x, 1.0));
+            prop_assert!(matches!(refused, Err(GeomError::NotFinite { .. })), "{refused:?}");
+            let refused = sampson_distance(f, Pixel::new(x, 1.0), Pixel::new(2.0, 3.0));
+            prop_assert!(matches!(refused, Err(GeomError::NotFinite { .. })), "{refused:?}");
+        }
     }
 
     #[test]

@@ -47,6 +47,9 @@ fn a_camera_refuses_a_bad_intrinsic_matrix() {
         flat[(index, index)] = 0.0;
         assert_eq!(camera_error(flat, r, t, SIZE), GeomError::ZeroFocalLength { index });
     }
+    let mut tiny = k();
+    (tiny[(0, 0)], tiny[(1, 1)]) = (1e-170, 1e-170);
+    assert!(matches!(camera_error(tiny, r, t, SIZE), GeomError::NotFinite { .. }));
 }
 
 #[test]
