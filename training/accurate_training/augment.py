@@ -41,10 +41,15 @@ def turn(planes: list[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]
 
 
 def enlarge(plane: np.ndarray, side: int, *, label: bool) -> np.ndarray:
-    """`plane` resampled bilinearly to `side` x `side`; a label is thresholded at one half."""
+    """`plane` resampled to `side` x `side`, no fewer than it has: bilinearly, a label by nearest pixels.
+
+    Every pixel of a label is there again beside its neighbours, so that its pieces stay what they were;
+    a bilinear label cut at one half would fall to dashes where it is a slanted line of one pixel.
+    """
     tensor = torch.from_numpy(np.ascontiguousarray(plane, dtype=np.float32))[None, None]
-    resampled = F.interpolate(tensor, size=(side, side), mode="bilinear", align_corners=False)[0, 0].numpy()
-    return (resampled >= 0.5).astype(np.uint8) if label else resampled
+    if label:
+        return F.interpolate(tensor, size=(side, side), mode="nearest-exact")[0, 0].numpy().astype(np.uint8)
+    return F.interpolate(tensor, size=(side, side), mode="bilinear", align_corners=False)[0, 0].numpy()
 
 
 def bend_greys(greys: np.ndarray, rng: np.random.Generator, params: AugmentParams) -> np.ndarray:

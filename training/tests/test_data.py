@@ -6,6 +6,7 @@ from accurate_training.augment import AugmentParams, bend_greys, enlarge, turn
 from accurate_training.batches import draw_batch
 from accurate_training.normalise import STD_FLOOR, z_score
 from accurate_training.shards import ShardError, ShardPool
+from skimage import measure
 
 from tests.conftest import write_shard
 
@@ -62,11 +63,20 @@ def test_turning_keeps_image_and_label_together():
     assert len(seen) == 8
 
 
-def test_enlarging_keeps_a_line_in_one_piece():
-    line = np.zeros((20, 20), np.uint8)
-    line[10, 2:18] = 1
-    larger = enlarge(line, 27, label=True)
-    assert larger[:, 4:23].any(axis=0).all()
+@pytest.mark.parametrize("radius", [0.5, 0.6, 0.75, 1.5])
+def test_enlarging_keeps_lines_of_any_slope_in_as_many_pieces(radius):
+    rng = np.random.default_rng(3)
+    rows, columns = np.mgrid[:80, :80]
+    for _ in range(60):
+        angle, side = rng.uniform(0, np.pi), int(rng.integers(81, 113))
+        across = (columns - 39.7) * np.sin(angle) - (rows - 40.2) * np.cos(angle)
+        line = (np.abs(across) <= radius).astype(np.uint8)
+        larger = enlarge(line, side, label=True)
+        assert larger.shape == (side, side) and larger.dtype == np.uint8
+        pieces = [measure.label(plane, connectivity=2).max() for plane in (line, larger)]
+        assert pieces[0] == pieces[1] >= 1
+        # As much wider as the plane: every pixel stands for its share of the area.
+        assert larger.mean() == pytest.approx(line.mean(), rel=0.15)
 
 
 def test_bent_greys_are_finite_for_a_flat_image():

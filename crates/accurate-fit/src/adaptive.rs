@@ -164,9 +164,10 @@ fn surprise(
     let points = problem.outlines.iter().map(|outline| outline.points.len()).sum::<usize>();
     let used = current.rows.iter().filter(|row| row.held && !row.outside).count();
     let unused = points.saturating_sub(used) as f64 / adaptive.noise_inflation;
-    let cost = problem.cost(current, &settings) / variance + unused;
+    let cost = problem.cost(current, &settings) + minimiser.prior_cost(current);
     let factors = &problem.local_smoothness;
-    cost + occam(inverse, spline.control.len(), variance, settings.lambda3, factors)
+    let unknowns = 3 * spline.control.len();
+    cost / variance + unused + occam(inverse, unknowns, variance, settings.lambda3, factors)
 }
 
 /// Alternates smoothness and curve; returns the steps taken and the inverse of the final normal

@@ -52,7 +52,8 @@ impl<'a> Minimiser<'a> {
         })
     }
 
-    fn prior_cost(&self, e: &Evaluation) -> f64 {
+    /// What the priors of the nuisance parameters add to twice the cost.
+    pub(crate) fn prior_cost(&self, e: &Evaluation) -> f64 {
         let Some(weights) = self.priors.nuisance_weights else { return 0.0 };
         let n = e.state.nuisance;
         [n.shift_px[0], n.shift_px[1], n.roll].iter().zip(weights).map(|(v, w)| w * v * v).sum()

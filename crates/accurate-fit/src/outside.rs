@@ -30,10 +30,12 @@ impl OutlineProblem<'_> {
             if self.doubt(view, p) < LEAST_DOUBT {
                 continue;
             }
+            // More than the distance where the target is the middle of a bridge.
+            let length = (target - p).norm();
             let u = chords.parameter(k);
             let (span, t) = spline.locate(u);
             let (p, jacobian) = projector.project_with_jacobian(&spline.combine(span, basis(t)));
-            let towards = (target - p) / distance;
+            let towards = (target - p) / length;
             let gradient = -(towards.transpose() * jacobian);
             e.rows.push(Row {
                 view,
@@ -94,5 +96,84 @@ impl OutlineProblem<'_> {
             }
         }
         (distance > 0.0).then_some((distance, target))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::nalgebra::Vector3;
+    use accurate_geom::{Curve3, Pixel, View1, View2};
+    use accurate_synth::{CaseOptions, Family, generate};
+
+    use crate::outline_problem::{Settings, State};
+    use crate::pose::pose;
+    use crate::projector::{Nuisance, Projector};
+    use crate::{Outline, OutlinePair};
+
+    /// Off the mask and off a bridge, a row's gradient is the derivative of its distance.
+    #[test]
+    fn the_pull_towards_masks_and_bridges_is_the_slope_of_the_distance() {
+        let case = generate(Family::Medium, 1900, 0, &CaseOptions::default()).unwrap();
+        let one = Outline::<View1>::from_mask(case.masks[0].view()).unwrap();
+        let two = Outline::<View2>::from_mask(case.masks[1].view()).unwrap();
+        let (p1, p2) = &case.exact_points;
+        let last = p1.len().min(p2.len()) - 1;
+        // Across the field: most samples of the curve below are nearer to the body, some to these.
+        let bridges1: Vec<(Pixel<View1>, Pixel<View1>)> =
+            (0..6).map(|k| (p1[k * last / 6], p1[last - k * last / 8])).collect();
+        let bridges2: Vec<(Pixel<View2>, Pixel<View2>)> =
+            (0..6).map(|k| (p2[k * last / 6], p2[last - k * last / 8])).collect();
+        let pair = OutlinePair::new(&one, &two).with_bridges(&bridges1, &bridges2);
+        let points: Vec<_> = case.truth.iter().step_by(25).copied().collect();
+        let truth = Curve3::interpolate(&points).unwrap();
+        let (problem, mut spline) = pose(&truth, &pair, &case.rig, 10.0).unwrap();
+        for (k, c) in spline.control.iter_mut().enumerate() {
+            *c += Vector3::new(8.0, 6.0, -7.0) * ((k as f64).sin() / problem.px_per_unit);
+        }
+        let settings = Settings {
+            reach_px: 3.0,
+            scale_px: 0.7,
+            stride: 1,
+            lambda2: 0.0,
+            lambda3: 0.0,
+            outside_weight: 1.0,
+            judged: false,
+        };
+        let state = State { spline, half_px: [1.5, 1.5], nuisance: Nuisance::default() };
+        let mut e = problem.evaluation(state);
+        problem.evaluate(&mut e, &settings).unwrap();
+
+        let projectors = Projector::pair(&case.rig);
+        let (mut beside_bridges, mut beside_masks) = (0, 0);
+        for row in e.rows.iter().filter(|row| row.outside) {
+            let at = e.state.spline.combine(row.span, row.basis);
+            let distance = |x: &Vector3<f64>| {
+                let p = projectors[row.view].project(x);
+                problem
+                    .outside(row.view, &p)
+                    .map(|(distance, target)| (distance, (target - p).norm()))
+            };
+            let Some((_, to_target)) = distance(&at) else { continue };
+            let is_bridge = to_target > row.distance + 1.0;
+            for axis in 0..3 {
+                // A thousandth of a px: far below the curvature of these distances.
+                let mut step = Vector3::zeros();
+                step[axis] = 1e-3 / problem.px_per_unit;
+                let (Some((ahead, _)), Some((behind, _))) =
+                    (distance(&(at + step)), distance(&(at - step)))
+                else {
+                    continue;
+                };
+                let numeric = (ahead - behind) / (2.0 * step[axis]);
+                // Where the nearest place jumps within the step the slope lies between two.
+                let tolerance = 0.02 * problem.px_per_unit;
+                if (numeric - row.gradient[axis]).abs() > tolerance {
+                    let jumps = (ahead + behind - 2.0 * row.distance).abs() > 1e-6;
+                    assert!(jumps, "view {} axis {axis}: {numeric} {:?}", row.view, row.gradient);
+                }
+            }
+            *(if is_bridge { &mut beside_bridges } else { &mut beside_masks }) += 1;
+        }
+        assert!(beside_bridges > 20 && beside_masks > 20, "{beside_bridges} {beside_masks}");
     }
 }

@@ -329,9 +329,10 @@ impl<'a> Fitter<'a> {
         let cost = self.problem.cost(&self.current, &self.current.rows, &self.settings) / variance
             + unused / params.noise_inflation;
         let scale = rows / params.noise_inflation * variance.ln();
-        let controls = self.current.state.spline.control.len();
+        // The calibration's priors too are given in units of the variance, which is estimated.
+        let unknowns = self.normal.unknowns();
         let factors = &self.problem.local_smoothness;
-        cost + scale + occam(inverse, controls, variance, self.settings.lambda3, factors)
+        cost + scale + occam(inverse, unknowns, variance, self.settings.lambda3, factors)
     }
 
     fn finish(
@@ -341,8 +342,14 @@ impl<'a> Fitter<'a> {
         rms_before_px: f64,
         steps: usize,
     ) -> Result<PointFit, FitError> {
-        let inverse = self.inverse()?;
+        let mut inverse = self.inverse()?;
+        let surprise = self.surprise(&inverse, params);
         let variance = COVARIANCE_INFLATION * self.noise_px * self.noise_px;
+        if let Some(priors) = params.calibration {
+            // What only a prior holds keeps the prior's spread, whatever residuals are worth here.
+            self.problem.nuisance_weights = Some(priors.weights(variance));
+            inverse = self.inverse()?;
+        }
         let first = 3 * self.current.state.spline.control.len();
         let calibration = params.calibration.map(|_| {
             let Nuisance { shift_px, roll } = self.current.state.nuisance;
@@ -351,7 +358,6 @@ impl<'a> Fitter<'a> {
         });
         let rms = self.rms();
         let chi2_per_point = (rms / self.noise_px).powi(2);
-        let surprise = self.surprise(&inverse, params);
         let state = self.current.state;
         let end = state.spline.spans() as f64;
         let beyond = [0, 1].map(|view| {

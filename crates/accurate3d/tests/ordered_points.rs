@@ -48,8 +48,9 @@ fn a_shift_of_image_2_is_estimated_from_ordered_points_where_it_can_be_seen() {
         let found = reconstruct(&pair, &params).unwrap();
         let c = found.diagnostics.calibration.expect("an estimate");
         assert!(c.observed_sigma_px < c.unobserved_sigma_px);
-        // The prior, of 0.7 px, is no worse than the posterior.
-        assert!(c.unobserved_sigma_px <= 0.7 * 1.0001, "{c:?}");
+        // Along the epipolar lines nothing is seen: what is left there is the prior, of 0.7 px, but for
+        // what the roll and the change of their direction along the curve show.
+        assert!((0.69..=0.7 * 1.0001).contains(&c.unobserved_sigma_px), "{c:?}");
         let along = |v: [f64; 2]| c.observed[0] * v[0] + c.observed[1] * v[1];
         // A roll of a milliradian at 200 px from the middle is 0.2 px.
         seen += usize::from((along(c.shift_px) - along(shift)).abs() < 0.2);

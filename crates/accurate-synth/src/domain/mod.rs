@@ -38,7 +38,7 @@ use target::Target;
 use wander::log_uniform;
 
 /// Changes whenever [`draw_xray`] gives other images for the same arguments.
-pub const XRAY_VERSION: u32 = 3;
+pub const XRAY_VERSION: u32 = 4;
 
 /// Ranges that an image is drawn from. The default is what the shipped network was trained on first,
 /// [`XrayDomain::of_pairs`] what it went on with.
@@ -85,7 +85,7 @@ pub struct XrayDomain {
     pub pair_probability: f64,
     /// Families of those pairs, at least one, drawn alike; one that is named twice, twice as often.
     pub pair_families: Vec<Family>,
-    /// Width of the wire in such a picture, px, drawn uniform in its logarithm; within 1 to 64.
+    /// Mean width of the wire in such a picture, px, drawn uniform in its logarithm; within 1 to 64.
     pub pair_width_px: RangeInclusive<f64>,
 }
 

@@ -25,12 +25,7 @@ pub(crate) fn draw(
     let side = domain.side_px;
     let family = domain.pair_families[rng.random_range(0..domain.pair_families.len())];
     let width_px = log_uniform(rng, *domain.pair_width_px.start(), *domain.pair_width_px.end());
-    let own = generate(family, seed, index, &CaseOptions::default()).ok()?;
-    let wide = CaseOptions { mask_thickness_px: Some(width_px), ..CaseOptions::default() };
-    let mut case = generate(family, seed, index, &wide).ok()?;
-    let [first, second] = own.mask_thickness_px;
-    // The picture shows the wire of the world: scaled as its mask is.
-    case.wire_radius = own.wire_radius * width_px / (0.5 * (first + second));
+    let mut case = generate(family, seed, index, &CaseOptions::default()).ok()?;
     let options = XrayOptions {
         dose_photons_per_px: log_uniform(rng, 100.0, 3000.0),
         contrast: rng.random_range(0.2..0.8),
@@ -42,6 +37,10 @@ pub(crate) fn draw(
     let view = rng.random_range(0..2_usize);
     let camera = [case.true_rig.camera1(), case.true_rig.camera2()][view];
     let course = Projection::new(camera, &case.truth).ok()?;
+    // The picture shows the wire of the world; its width follows the distance to the camera.
+    let focal = camera.k()[(0, 0)].abs();
+    let mean_depth = course.depth.iter().sum::<f64>() / course.depth.len().max(1) as f64;
+    case.wire_radius = 0.5 * width_px * mean_depth / focal;
     let picture = render_xray_of_view(&case, view, &options);
     let (rows, columns) = picture.dim();
     let square = side as usize;
@@ -55,8 +54,6 @@ pub(crate) fn draw(
     let inverted = rng.random_bool(0.2);
     let image = windowed(&cut, rng, inverted);
 
-    // The wire's width in this view follows its distance to the camera.
-    let focal = camera.k()[(0, 0)].abs();
     let shift = nalgebra::Vector2::new(left as f64, top as f64);
     let points: Vec<Point2> = course.points.iter().map(|p| p - shift).collect();
     let arc = crate::polyline::arc_lengths(&points);

@@ -1,4 +1,4 @@
-use accurate_fit::{OutlineFit, OutlineFitParams};
+use accurate_fit::{OutlineFit, OutlineFitParams, UnexplainedStretch};
 use accurate_geom::Rig;
 
 use super::RobustParams;
@@ -29,33 +29,31 @@ const UNUSED_PX2: f64 = 1.0 / 18.0;
 /// hides the body.
 pub(crate) type CutEnds = [Vec<[f64; 2]>; 2];
 
-/// What a fit leaves unexplained besides cut faces.
+/// What a fit leaves unexplained besides cut faces and strays.
 fn unexplained(fit: &OutlineFit, cuts: &CutEnds) -> f64 {
     let cut = |view: u8, points: &[[f64; 2]]| {
         cuts[usize::from(view == 2)]
             .iter()
             .any(|[x, y]| points.iter().all(|[px, py]| (px - x).hypot(py - y) < CUT_PX))
     };
-    let faces: f64 = fit
-        .unexplained
-        .iter()
-        .filter(|stretch| cut(stretch.view, &stretch.points))
-        .map(|stretch| stretch.unexplained.min(CUT_UNEXPLAINED))
-        .sum();
-    (fit.judgement.unexplained - faces - strays(fit)).max(0.0)
+    let face = |stretch: &UnexplainedStretch| {
+        let is_face = cut(stretch.view, &stretch.points);
+        if is_face { stretch.unexplained.min(CUT_UNEXPLAINED) } else { 0.0 }
+    };
+    // A piece beside a cut end is one or the other.
+    let forgiven: f64 = fit.unexplained.iter().map(|s| face(s).max(stray(s))).sum();
+    (fit.judgement.unexplained - forgiven).max(0.0)
 }
 
-/// What need not be explained of pieces of a segmentation that are none of the body.
-fn strays(fit: &OutlineFit) -> f64 {
-    let pieces = fit.unexplained.iter().filter(|stretch| stretch.isolated && stretch.from_map);
-    pieces
-        .map(|piece| {
-            let points = piece.points.len() as f64;
-            let [from, to] = STRAY_POINTS;
-            let share = STRAY_SHARE + (1.0 - STRAY_SHARE) * ((points - from) / (to - from));
-            (1.0 - share.clamp(STRAY_SHARE, 1.0)) * piece.unexplained
-        })
-        .sum()
+/// What need not be explained of a piece of a segmentation that is none of the body.
+fn stray(stretch: &UnexplainedStretch) -> f64 {
+    if !(stretch.isolated && stretch.from_map) {
+        return 0.0;
+    }
+    let points = stretch.points.len() as f64;
+    let [from, to] = STRAY_POINTS;
+    let share = STRAY_SHARE + (1.0 - STRAY_SHARE) * ((points - from) / (to - from));
+    (1.0 - share.clamp(STRAY_SHARE, 1.0)) * stretch.unexplained
 }
 
 /// A fitted curve with all that counts in the choice.
