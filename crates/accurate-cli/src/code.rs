@@ -228,8 +228,9 @@ impl Code {
                  message names it."
             }
             Self::Io => {
-                "Reading or writing failed: no permission, no space, or a broken medium. Files are \
-                 written whole or not at all, so nothing half-written is left."
+                "Reading or writing failed: no permission, no space, a broken medium, or a file where a \
+                 folder has to be. Places are looked at before the work. Files are written whole or \
+                 not at all, so nothing half-written is left."
             }
         }
     }

@@ -34,22 +34,26 @@ pub fn expand(command: &Command, mut words: Vec<OsString>) -> Result<Vec<OsStrin
     check(command, &table, "").map_err(wrong)?;
     let own: Vec<String> = words.iter().map(|w| w.to_string_lossy().into_owned()).collect();
     // The global options first, then the command's, then those of a command below it.
-    let (mut here, mut at, mut insert_at) = (command, 0, 1);
+    let (mut here, mut insert_at) = (command, 1);
     loop {
         // Of an option that may be given several times, the user's own replace those of the file.
         for arg in options(here).filter(|arg| is_list(arg) && is_given(arg, &own)) {
             table.remove(&name(arg));
         }
-        let new = words_of(here, &table).map_err(wrong)?;
+        let below = next_command(here, &words, insert_at);
+        // Such a command takes either options of its own or a command below it.
+        let new = match below {
+            Some(_) if here.is_args_conflicts_with_subcommands_set() => Vec::new(),
+            _ => words_of(here, &table).map_err(wrong)?,
+        };
         let count = new.len();
         words.splice(insert_at..insert_at, new);
-        at = at.max(insert_at - 1) + count;
-        let Some((position, below)) = next_command(here, &words, at + 1) else { break };
+        let Some((position, below)) = below.map(|(at, below)| (at + count, below)) else { break };
         table = match table.remove(below.get_name()) {
             Some(Toml::Table(inner)) => inner,
             _ => Table::new(),
         };
-        (here, at, insert_at) = (below, position, position + 1);
+        (here, insert_at) = (below, position + 1);
     }
     Ok(words)
 }
@@ -58,7 +62,9 @@ pub fn expand(command: &Command, mut words: Vec<OsString>) -> Result<Vec<OsStrin
 pub fn effective(command: &Command, matches: &ArgMatches) -> String {
     fn table_of(command: &Command, matches: &ArgMatches) -> Table {
         let mut table = Table::new();
-        for arg in options(command) {
+        let own =
+            matches.subcommand().is_none() || !command.is_args_conflicts_with_subcommands_set();
+        for arg in options(command).filter(|_| own) {
             let id = arg.get_id().as_str();
             if matches.value_source(id).is_none() {
                 continue;
@@ -78,9 +84,11 @@ pub fn effective(command: &Command, matches: &ArgMatches) -> String {
                     .collect();
                 match (words.as_slice(), is_list(arg)) {
                     ([], _) => continue,
-                    ([one], false) => {
-                        one.parse::<i64>().map_or_else(|_| Toml::String(one.clone()), Toml::Integer)
-                    }
+                    ([one], false) => match one.parse::<i64>() {
+                        Ok(number) if number.to_string() == *one => Toml::Integer(number),
+                        // Also `007`, which may be a file.
+                        _ => Toml::String(one.clone()),
+                    },
                     _ => words.into(),
                 }
             };
@@ -129,7 +137,12 @@ pub fn schema(command: &Command) -> Value {
             if let Some(about) = below.get_about() {
                 inner["description"] = Value::from(about.to_string());
             }
-            properties.insert(below.get_name().to_owned(), inner);
+            // A command may have the name of an option beside it: a table is the command's.
+            let entry = properties.entry(below.get_name()).or_insert(Value::Null);
+            *entry = match entry.take() {
+                Value::Null => inner,
+                option => json!({"anyOf": [option, inner]}),
+            };
         }
         json!({"type": "object", "properties": properties, "additionalProperties": false})
     }
@@ -170,12 +183,13 @@ fn next_command<'a>(
     let mut at = from;
     while let Some(word) = words.get(at) {
         let word = word.to_string_lossy();
-        if let Some(long) = word.strip_prefix("--") {
-            // Its value, if it takes one and has not got it with `=`, is no command.
-            let takes_value = options(command)
-                .chain(command.get_arguments())
-                .any(|a| a.get_long() == Some(long) && a.get_action().takes_values());
-            at += usize::from(takes_value);
+        // Its value, if it takes one and has not got it with `=` or at once, is no command.
+        let is_named = |arg: &Arg| match word.strip_prefix("--") {
+            Some(long) => arg.get_long() == Some(long),
+            None => arg.get_short().is_some_and(|short| word == format!("-{short}")),
+        };
+        if command.get_arguments().any(|arg| is_named(arg) && arg.get_action().takes_values()) {
+            at += 1;
         } else if !word.starts_with('-') {
             return command.find_subcommand(&*word).map(|below| (at, below));
         }
@@ -213,6 +227,10 @@ fn words_of(command: &Command, table: &Table) -> Result<Vec<OsString>, String> {
     for arg in options(command) {
         let key = name(arg);
         let Some(value) = table.get(&key) else { continue };
+        // The table of a command that has the name of an option.
+        if value.is_table() && subcommands(command).any(|below| below.get_name() == key) {
+            continue;
+        }
         match (arg.get_action(), value) {
             (ArgAction::SetTrue, Toml::Boolean(on)) => {
                 words.extend(on.then(|| format!("--{key}").into()));
@@ -225,12 +243,32 @@ fn words_of(command: &Command, table: &Table) -> Result<Vec<OsString>, String> {
             (_, Toml::Array(items)) if is_list(arg) => {
                 let items: Vec<String> =
                     items.iter().map(|item| scalar(&key, item)).collect::<Result<_, _>>()?;
-                words.push(format!("--{key}={}", items.join(",")).into());
+                words.extend(words_of_list(arg, &items)?);
             }
             _ => words.push(format!("--{key}={}", scalar(&key, value)?).into()),
         }
     }
     Ok(words)
+}
+
+/// A list as the argument expects it: in one word where it splits words, in groups where it takes
+/// several at once, else once for each.
+fn words_of_list(arg: &Arg, items: &[String]) -> Result<Vec<OsString>, String> {
+    let key = name(arg);
+    if let Some(delimiter) = arg.get_value_delimiter() {
+        return Ok(vec![format!("--{key}={}", items.join(&delimiter.to_string())).into()]);
+    }
+    let group = arg.get_num_args().map_or(1, |range| range.min_values());
+    if group < 2 {
+        return Ok(items.iter().map(|item| format!("--{key}={item}").into()).collect());
+    }
+    if !items.len().is_multiple_of(group) {
+        return Err(format!("`{key}` takes {group} values at once, not {}", items.len()));
+    }
+    let words = items.chunks(group).flat_map(|values| {
+        std::iter::once(format!("--{key}").into()).chain(values.iter().map(OsString::from))
+    });
+    Ok(words.collect())
 }
 
 fn scalar(key: &str, value: &Toml) -> Result<String, String> {
@@ -248,7 +286,8 @@ fn options(command: &Command) -> impl Iterator<Item = &Arg> {
         .filter(|arg| arg.get_long().is_some_and(|long| !NOT_IN_A_FILE.contains(&long)))
 }
 
-fn subcommands(command: &Command) -> impl Iterator<Item = &Command> {
+/// The commands below a command that a user sees.
+pub fn subcommands(command: &Command) -> impl Iterator<Item = &Command> {
     command.get_subcommands().filter(|below| !below.is_hide_set() && below.get_name() != "help")
 }
 
@@ -319,5 +358,71 @@ mod tests {
         assert!(again.contains(&"--cases=3".to_owned()), "{again:?}");
         assert!(again.contains(&"--seeds=1,2".to_owned()), "{again:?}");
         assert!(again.contains(&"--threads=2".to_owned()), "{again:?}");
+    }
+
+    /// What a saved config and the words that no file holds are parsed to, as a config again.
+    fn again(words: &[&str], positional: &[&str]) -> (String, String) {
+        let command = Cli::command().args_override_self(true);
+        let parse = |words: Vec<OsString>| {
+            let matches = command.clone().try_get_matches_from(words).unwrap();
+            effective(&command, &matches)
+        };
+        let config = parse(words.iter().map(OsString::from).collect());
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("config.toml");
+        std::fs::write(&path, &config).unwrap();
+        let mut all: Vec<OsString> = vec!["accurate".into(), "--config".into(), path.into()];
+        all.extend(positional.iter().map(OsString::from));
+        (config.clone(), parse(expand(&command, all).unwrap()))
+    }
+
+    #[test]
+    fn lists_come_back_as_they_were() {
+        let reconstruct = "accurate reconstruct x -i mask -o a,b -o b.vtp --cameras l.yml \
+                           --cameras r.yml --frame 0 --frame 7 --also ply,npy --truth 007";
+        let doctor = "accurate camera doctor rig.toml --masks a b --masks c d --views l,r";
+        let xray = "accurate synth xray --sheet s.png --size 64 -n 3";
+        for (words, positional) in [
+            (reconstruct, &["reconstruct", "x"][..]),
+            (doctor, &["camera", "doctor", "rig.toml"]),
+            (xray, &["synth", "xray"]),
+            ("accurate synth easy --xray -o xray", &["synth", "easy"]),
+        ] {
+            let words: Vec<&str> = words.split_whitespace().collect();
+            let (config, again) = again(&words, positional);
+            assert_eq!(config, again);
+            assert!(config.lines().count() > 3, "{config}");
+        }
+    }
+
+    #[test]
+    fn an_empty_list_is_a_list() {
+        let words = "accurate model import x -o y --mirror-axes=".split(' ').collect::<Vec<_>>();
+        let (config, again) = again(&words, &["model", "import", "x"]);
+        assert_eq!(config, again);
+        assert!(config.contains("mirror-axes = [\"\"]"), "{config}");
+        let words = expanded("[model.import]\nmirror-axes = []\n", &["model", "import", "x"]);
+        assert!(words.unwrap().contains(&"--mirror-axes=".to_owned()));
+    }
+
+    #[test]
+    fn values_that_do_not_fill_their_groups_are_refused() {
+        let config = "[camera.doctor]\nmasks = [\"a.png\"]\n";
+        let error = expanded(config, &["camera", "doctor", "rig.toml"]).unwrap_err();
+        assert!(error.contains("`masks` takes 2 values at once"), "{error}");
+    }
+
+    #[test]
+    fn an_option_and_a_command_of_one_name_are_told_apart() {
+        let config = "[synth]\nxray = true\ncount = 3\n";
+        let words = expanded(config, &["synth", "-o", "xray", "easy"]).unwrap();
+        assert!(words.contains(&"--xray".to_owned()), "{words:?}");
+        let config = "[synth]\ncount = 3\n[synth.xray]\nsheet = \"s.png\"\n";
+        let words = expanded(config, &["synth", "xray"]).unwrap();
+        assert!(words.ends_with(&["xray".to_owned(), "--sheet=s.png".to_owned()]), "{words:?}");
+        assert!(!words.contains(&"--count=3".to_owned()), "{words:?}");
+        let schema = schema(&Cli::command());
+        let both = &schema["properties"]["synth"]["properties"]["xray"]["anyOf"];
+        assert_eq!((&both[0]["type"], &both[1]["type"]), (&"boolean".into(), &"object".into()));
     }
 }

@@ -1,4 +1,4 @@
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -41,14 +41,26 @@ impl Console {
     /// A remark, unless `-q`.
     pub fn remark(&self, line: &str) {
         if !self.quiet {
-            eprintln!("{line}");
+            to_stderr(line);
         }
     }
 
     /// A detail, with `-v`.
     pub fn detail(&self, line: &str) {
         if self.verbose > 0 {
-            eprintln!("{line}");
+            to_stderr(line);
+        }
+    }
+
+    /// The failure of one of several things, also with `-q`. `kind` says what `name` is one of: the
+    /// key of the JSON form.
+    pub fn failure_of(&self, kind: &str, name: &str, failure: &Failure) {
+        if self.json {
+            let mut value = failure.json();
+            value[kind] = name.into();
+            to_stderr(&value.to_string());
+        } else {
+            to_stderr(&failure.clone().of(name).styled(coloured()));
         }
     }
 
@@ -64,4 +76,14 @@ impl Console {
         bar.enable_steady_tick(Duration::from_millis(200));
         bar
     }
+}
+
+/// A line of prose. Where nobody reads stderr (`2>&1 | head`) there is nobody to tell either.
+pub fn to_stderr(line: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
+}
+
+/// Whether stderr shows colours.
+pub fn coloured() -> bool {
+    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
 }

@@ -13,7 +13,7 @@ use crate::code::Code;
 use crate::segmentation::code_of;
 
 /// What went wrong, what to do about it, and the exit code that says so to a script.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Failure {
     code: Code,
     message: String,
@@ -45,8 +45,23 @@ impl Failure {
 
     /// The same with the file it is about in front.
     pub fn of_file(self, path: &Path) -> Self {
-        let message = format!("{}: {}", path.display(), self.message);
+        self.of(&path.display().to_string())
+    }
+
+    /// The same with what it is about in front.
+    pub fn of(self, name: &str) -> Self {
+        let message = format!("{name}: {}", self.message);
         self.about(message)
+    }
+
+    /// A failure to write `path`. A missing folder is an output error here, not a missing input.
+    pub fn of_output(error: IoError) -> Self {
+        match error {
+            IoError::Missing { path, .. } => {
+                Self::new(Self::IO, format!("cannot write {}: its folder is gone", path.display()))
+            }
+            error => error.into(),
+        }
     }
 
     pub fn exit_code(&self) -> ExitCode {
@@ -160,6 +175,20 @@ impl From<Error> for Failure {
             Error::Synthesis(_) => Self::new(Self::USAGE, message),
             _ => Self::new(Self::INTERNAL, message),
         }
+    }
+}
+
+impl From<clap::Error> for Failure {
+    /// The parser's paragraphs: the error, a tip where it has one, the usage.
+    fn from(error: clap::Error) -> Self {
+        let text = error.to_string();
+        let in_one_line = |part: &str| part.split_whitespace().collect::<Vec<_>>().join(" ");
+        let mut parts = text.split("\n\n").map(in_one_line);
+        let first = parts.next().unwrap_or_default();
+        let message = first.strip_prefix("error: ").unwrap_or(&first);
+        let tip = parts.find_map(|part| part.strip_prefix("tip: ").map(str::to_owned));
+        Self::new(Self::USAGE, message)
+            .with_hint(tip.unwrap_or_else(|| "`accurate help COMMAND` shows every option".into()))
     }
 }
 

@@ -4,7 +4,7 @@
 //! JSON with `--json`.
 
 // Printing is this binary's job; the libraries below it never do.
-#![allow(clippy::print_stdout, clippy::print_stderr)]
+#![allow(clippy::print_stdout)]
 
 mod args;
 mod code;
@@ -17,34 +17,35 @@ mod raster;
 mod segmentation;
 mod text;
 mod two_views;
+mod units;
 
-use std::io::IsTerminal;
 use std::process::ExitCode;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches};
 
 use crate::args::Cli;
+use crate::console::{coloured, to_stderr};
 use crate::failure::Failure;
 
 fn main() -> ExitCode {
     let words: Vec<_> = std::env::args_os().collect();
     // As asked for on the command line alone: an unreadable config file is reported in that form too.
     let json = words.iter().any(|word| word == "--json");
-    match run(words) {
+    match run(words, json) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) if json => {
-            eprintln!("{}", failure.json());
+            to_stderr(&failure.json().to_string());
             failure.exit_code()
         }
         Err(failure) => {
-            let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-            eprintln!("{}", failure.styled(colour));
+            to_stderr(&failure.styled(coloured()));
             failure.exit_code()
         }
     }
 }
 
-fn run(words: Vec<std::ffi::OsString>) -> Result<(), Failure> {
+fn run(words: Vec<std::ffi::OsString>, json: bool) -> Result<(), Failure> {
     // Before anything else takes memory: this process may be the limited reader of one file.
     if words.get(1).is_some_and(|word| word == dicom_child::WORD) {
         return dicom_child::child(&words);
@@ -52,7 +53,25 @@ fn run(words: Vec<std::ffi::OsString>) -> Result<(), Failure> {
     // What a config file says stands before what the user says, and the last word wins.
     let command = Cli::command().args_override_self(true);
     let words = config::expand(&command, words)?;
-    let matches = command.clone().get_matches_from(words);
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let parsed = command
+        .clone()
+        .try_get_matches_from(words)
+        .and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, matches)));
+    let (cli, matches) = match parsed {
+        Ok(parsed) => parsed,
+        Err(error) if json && is_mistake(&error) => return Err(error.into()),
+        // The parser's own words show more: the usage, in colours.
+        Err(error) if is_mistake(&error) => {
+            let _ = error.print();
+            to_stderr(&format!("  more: accurate explain {}", Failure::USAGE));
+            std::process::exit(error.exit_code())
+        }
+        Err(error) => error.exit(),
+    };
     commands::run(&cli, &config::effective(&command, &matches))
+}
+
+/// Whether the command line is wrong, rather than a question for help or the version.
+fn is_mistake(error: &clap::Error) -> bool {
+    error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
 }

@@ -29,7 +29,7 @@ pub fn is_picture(path: &Path) -> bool {
 pub fn write_picture(path: &Path, svg: &str, png_scale: f32) -> Result<(), Failure> {
     if is_png(path) {
         let bytes = png(svg, png_scale)?;
-        return Ok(write_atomically(path, |file| file.write_all(&bytes))?);
+        return write_atomically(path, |file| file.write_all(&bytes)).map_err(Failure::of_output);
     }
     if has_extension(path, "svg") {
         return write_text(path, svg);

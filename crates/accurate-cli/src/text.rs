@@ -17,7 +17,50 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
 
 /// Writes a text file whole or not at all.
 pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
-    Ok(write_atomically(path, |file| file.write_all(text.as_bytes()))?)
+    write_atomically(path, |file| file.write_all(text.as_bytes())).map_err(Failure::of_output)
+}
+
+/// Refuses an output file that cannot be, before anything is computed for it.
+///
+/// # Errors
+/// [`Failure::IO`] if a folder has its name, or if a file stands where a folder above it has to be.
+pub fn check_output(path: &Path) -> Result<(), Failure> {
+    if path.is_dir() {
+        let message = format!("cannot write {}: it is a folder", path.display());
+        return Err(Failure::new(Failure::IO, message).with_hint("name a file"));
+    }
+    check_folder(path.parent().unwrap_or(path))
+}
+
+/// The same for a folder that outputs are to go to.
+pub fn check_folder(path: &Path) -> Result<(), Failure> {
+    match path.ancestors().find(|folder| folder.exists()) {
+        Some(file) if !file.is_dir() => {
+            let message = format!("cannot make folder {}", path.display());
+            let message = format!("{message}: {} is a file", file.display());
+            Err(Failure::new(Failure::IO, message))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Checks a place for an output file and makes its folder: what fails, fails before the work.
+pub fn make_place(path: &Path) -> Result<(), Failure> {
+    check_output(path)?;
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => make_folder(folder),
+        _ => Ok(()),
+    }
+}
+
+/// Removes a file where there is one.
+pub fn remove_file(path: &Path) -> Result<(), Failure> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(Failure::new(Failure::IO, format!("cannot remove {}: {error}", path.display())))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Makes the folder that outputs go to.

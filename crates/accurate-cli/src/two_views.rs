@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 
 use accurate3d::InputKind;
 use accurate3d::io::{
-    FrameChoice, NamedView, Pair, ViewDefaults, ViewFiles, is_dicom, pair_of_views, read_cameras,
-    read_grey,
+    FrameChoice, NamedView, Pair, PairParts, ViewDefaults, ViewFiles, hash_pair, is_dicom,
+    pair_of_views, read_cameras, read_curve, read_grey,
 };
 use ndarray::Array2;
 
 use crate::args::{ReconstructArgs, ViewArgs};
 use crate::dicom_child;
 use crate::failure::Failure;
+use crate::units::common_unit;
 
 /// The cameras of files of any kind; DICOM is read by a process of its own.
 pub fn cameras_of(files: &[PathBuf], defaults: &ViewDefaults) -> Result<Vec<NamedView>, Failure> {
@@ -42,26 +43,37 @@ pub fn two_cameras(
     defaults: &ViewDefaults,
 ) -> Result<[NamedView; 2], Failure> {
     let views = cameras_of(files, defaults)?;
-    let names = || views.iter().map(|v| v.name.as_str()).collect::<Vec<_>>().join(", ");
     let chosen: Vec<NamedView> = match wanted {
         [] => views.clone(),
-        wanted => wanted
-            .iter()
-            .map(|name| {
-                views.iter().find(|view| &view.name == name).cloned().ok_or_else(|| {
-                    Failure::new(Failure::USAGE, format!("no view `{name}` in the camera files"))
-                        .with_hint(format!("there are: {}", names()))
-                })
-            })
-            .collect::<Result<_, _>>()?,
+        wanted => wanted.iter().map(|name| named(&views, name)).collect::<Result<_, _>>()?,
     };
     <[NamedView; 2]>::try_from(chosen).map_err(|chosen| {
         Failure::new(
             Failure::USAGE,
-            format!("two cameras are needed, but there are {}: {}", chosen.len(), names()),
+            format!("two cameras are needed, but there are {}: {}", chosen.len(), names(&views)),
         )
         .with_hint("repeat --cameras for more files; choose among more with --views NAME,NAME")
     })
+}
+
+/// The one view of this name.
+pub fn named(views: &[NamedView], name: &str) -> Result<NamedView, Failure> {
+    let found: Vec<&NamedView> = views.iter().filter(|view| view.name == name).collect();
+    match found.as_slice() {
+        [one] => Ok((*one).clone()),
+        [] => Err(Failure::new(Failure::USAGE, format!("no view `{name}` in the camera files"))
+            .with_hint(format!("there are: {}", names(views)))),
+        several => {
+            let message = format!("{} views are called `{name}`", several.len());
+            Err(Failure::new(Failure::USAGE, message).with_hint(
+                "rename one, or give the camera files in the order of the views and no names",
+            ))
+        }
+    }
+}
+
+fn names(views: &[NamedView]) -> String {
+    views.iter().map(|view| view.name.as_str()).collect::<Vec<_>>().join(", ")
 }
 
 /// Whether the inputs are the files of two views rather than pair folders.
@@ -102,6 +114,11 @@ pub fn pair_of_files(args: &ReconstructArgs) -> Result<(Pair, Vec<PathBuf>), Fai
             two.display()
         )));
     }
+    let frames_of = dicom.iter().filter(|is| **is).count();
+    if args.frame.len() > frames_of {
+        let message = format!("--frame {} times, with {frames_of} DICOM runs", args.frame.len());
+        return Err(usage(message).with_hint("only DICOM runs have frames: leave --frame out"));
+    }
     let ViewArgs { cameras, views, stated } = &args.views;
     // A DICOM run is its own camera file.
     let camera_files = if cameras.is_empty() { &args.inputs } else { cameras };
@@ -111,26 +128,49 @@ pub fn pair_of_files(args: &ReconstructArgs) -> Result<(Pair, Vec<PathBuf>), Fai
         InputKind::Points => ViewFiles::Points(paths),
         InputKind::Mask => ViewFiles::Masks(paths),
         InputKind::Image if dicom.contains(&true) => {
-            let [first, second] = frame_choices(&args.frame)?;
+            let [first, second] = frame_choices(&args.frame);
             let frames = [frame_of(one, dicom[0], first)?, frame_of(two, dicom[1], second)?];
             ViewFiles::Frames(paths, frames)
         }
         InputKind::Image => ViewFiles::Images(paths),
     };
-    let mut sources = args.views.cameras.clone();
-    sources.extend(args.inputs.iter().cloned());
-    Ok((pair_of_views(&views, files, args.truth.as_deref())?, sources))
+    let mut pair = pair_of_views(&views, files, None)?;
+    if let Some(path) = &args.truth {
+        let truth = read_curve(path)?;
+        let name = path.display().to_string();
+        common_unit(("the world of the cameras", pair.rig.unit()), (&name, truth.unit))?;
+        pair.truth = Some(truth.points);
+    }
+    let mut sources = Vec::new();
+    for path in &args.views.cameras {
+        sources.extend(files_behind(path)?);
+    }
+    sources.extend(args.inputs.iter().chain(&args.truth).cloned());
+    Ok((pair, sources))
 }
 
-fn frame_choices(frames: &[u32]) -> Result<[FrameChoice; 2], Failure> {
+/// The files that cameras named by one path are read from.
+fn files_behind(path: &Path) -> Result<Vec<PathBuf>, Failure> {
+    // COLMAP's two files may be named by their folder or by one of them.
+    const COLMAP: [&str; 2] = ["cameras.txt", "images.txt"];
+    let is_one = COLMAP.iter().any(|name| path.file_name().is_some_and(|file| file == *name));
+    let folder = if is_one { path.parent().unwrap_or(path) } else { path };
+    if is_one || folder.join(COLMAP[0]).is_file() {
+        return Ok(COLMAP.map(|name| folder.join(name)).to_vec());
+    }
+    if path.is_dir() {
+        let files = hash_pair(path, PairParts::default())?;
+        return Ok(files.into_iter().map(|(file, _)| file).collect());
+    }
+    Ok(vec![path.to_owned()])
+}
+
+/// How the frames are chosen, for at most two of them.
+fn frame_choices(frames: &[u32]) -> [FrameChoice; 2] {
     match frames {
-        [] => Ok([FrameChoice::Mean; 2]),
-        [both] => Ok([FrameChoice::One(*both); 2]),
-        [one, two] => Ok([FrameChoice::One(*one), FrameChoice::One(*two)]),
-        more => {
-            let message = format!("--frame {} times; there are two views", more.len());
-            Err(Failure::new(Failure::USAGE, message))
-        }
+        [] => [FrameChoice::Mean; 2],
+        [both] => [FrameChoice::One(*both); 2],
+        [one, two, ..] => [FrameChoice::One(*one), FrameChoice::One(*two)],
     }
 }
 

@@ -110,7 +110,7 @@ fn every_error_names_a_code_that_can_be_explained() {
 fn a_typing_error_is_told_what_was_meant() {
     let (code, error) = stderr_of_failure(&mut accurate(&["reconstrct"]));
     assert_eq!(code, 2);
-    assert!(error.contains("reconstruct"), "{error}");
+    assert!(error.contains("reconstruct") && error.contains("explain A002"), "{error}");
     let words = ["reconstruct", "x", "--input", "mask", "--out", "y", "--method", "hofmann"];
     let (_, error) = stderr_of_failure(&mut accurate(&words));
     assert!(error.contains("did you mean `hoffmann`"), "{error}");
@@ -168,4 +168,60 @@ fn a_recorded_table_is_verified_and_a_changed_one_is_not() {
     let (code, error) = stderr_of_failure(accurate(&["verify"]).arg(&out));
     assert_eq!(code, 1);
     assert!(error.contains("A004") && error.contains("table1-phantom.md was changed"), "{error}");
+}
+
+#[test]
+fn a_command_line_that_is_wrong_is_json_with_json() {
+    for (words, message, hint) in [
+        (&["reconstruct", "x", "--out", "y"][..], "--input <INPUT>", "every option"),
+        (&["table", "--case", "3"], "unexpected argument '--case'", "'--cases'"),
+        (&["reconstrct"], "reconstrct", "'reconstruct'"),
+        (&["demo", "--threads", "9999"], "9999 is not in 0..=1024", "every option"),
+    ] {
+        let (code, error) = stderr_of_failure(accurate(words).arg("--json"));
+        assert_eq!(code, 2, "{words:?}");
+        let error: Value = serde_json::from_str(&error).unwrap();
+        assert_eq!((&error["code"], &error["exit"]), (&"A002".into(), &2.into()));
+        assert!(error["error"].as_str().unwrap().contains(message), "{error}");
+        assert!(!error["error"].as_str().unwrap().contains('\n'), "{error}");
+        assert!(error["hint"].as_str().unwrap().contains(hint), "{error}");
+    }
+    // A question is none.
+    assert!(stdout(&mut accurate(&["--json", "--version"])).starts_with("accurate "));
+}
+
+#[test]
+#[cfg(unix)]
+fn nobody_has_to_read_stderr() {
+    use std::process::{Command, Stdio};
+    let dir = TempDir::new().unwrap();
+    let run = |words: &[&str]| {
+        let (reader, writer) = std::io::pipe().unwrap();
+        // As `2>&1 | head -0`: the pipe has no other end.
+        drop(reader);
+        let mut command = Command::new(env!("CARGO_BIN_EXE_accurate"));
+        command.current_dir(dir.path()).args(words).stdin(Stdio::null());
+        command.stdout(writer.try_clone().unwrap()).stderr(writer);
+        command.status().unwrap().code()
+    };
+    assert_eq!(run(&["synth", "easy", "-n", "1", "--out", "set"]), Some(0));
+    assert_eq!(run(&["explain", "A999"]), Some(2));
+    assert_eq!(run(&["reconstruct", "-i", "mask", "-o", "out", "nowhere", "set"]), Some(66));
+}
+
+#[test]
+fn every_command_below_another_has_a_page_with_a_heading_of_one_line() {
+    let manual = stdout(&mut accurate(&["man"]));
+    for name in ["accurate-camera-doctor", "accurate-synth-xray", "accurate-model-pack"] {
+        assert!(manual.contains(&format!(".TH {name} 1")), "no page of {name}");
+    }
+    let mut lines = manual.lines().peekable();
+    while let Some(line) = lines.next() {
+        if line.starts_with(".TH") {
+            assert!(line.matches('"').count() % 2 == 0, "{line}");
+            assert!(line.contains(concat!(" ", env!("CARGO_PKG_VERSION"), "\"")), "{line}");
+            assert_eq!(lines.peek(), Some(&".SH NAME"), "{line}");
+        }
+    }
+    assert!(stdout(&mut accurate(&["eval", "--help"])).contains("mrk.json"));
 }

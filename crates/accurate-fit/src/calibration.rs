@@ -19,7 +19,11 @@ impl CalibrationPriors {
     /// A turn of some 0.03 degrees under f = 1200 px, or a principal point half a pixel off.
     pub const DEFAULT: Self = Self { shift_sigma_px: 0.7, roll_sigma_rad: 1e-3 };
 
-    pub(crate) fn validate(&self) -> Result<(), FitError> {
+    /// Refuses what is no standard deviation.
+    ///
+    /// # Errors
+    /// [`FitError::BadParameter`] for one that is not positive and finite.
+    pub fn validate(&self) -> Result<(), FitError> {
         for (name, value) in
             [("shift_sigma_px", self.shift_sigma_px), ("roll_sigma_rad", self.roll_sigma_rad)]
         {

@@ -40,6 +40,13 @@ impl Judgement {
         if used == 0 { 4.0 } else { self.chi / used as f64 }
     }
 
+    /// [`unexplained`](Self::unexplained) in parts of what a curve far from all of the outlines leaves: 0
+    /// to 1.
+    pub fn unexplained_share(&self) -> f64 {
+        let points = self.points[0] + self.points[1];
+        self.unexplained / (MOST_EXCESS_PX / 10.0 * points.max(1) as f64)
+    }
+
     /// One number, smaller is better, to compare fits to the same outlines:
     /// `unexplained + outside + chi / 2 + 5 bending`.
     pub fn score(&self) -> f64 {
@@ -62,11 +69,14 @@ pub struct UnexplainedStretch {
     pub from_map: bool,
 }
 
+/// The misfit of an outline point counts no more than this, px.
+const MOST_EXCESS_PX: f64 = 4.0;
+
 /// Misfit of outline point `i` beyond what digitisation explains, px, as far as the body is sure
 /// there.
 fn excess(problem: &OutlineProblem<'_>, e: &Evaluation, view: usize, i: usize) -> f64 {
     let trust = problem.outlines[view].map.as_ref().map_or(1.0, |map| map.trust[i]);
-    trust * (residual(e, view, i).abs() - 0.8).clamp(0.0, 4.0)
+    trust * (residual(e, view, i).abs() - 0.8).clamp(0.0, MOST_EXCESS_PX)
 }
 
 /// Residual of outline point `i` against the nearest point of the curve, whatever the gates say.

@@ -3,6 +3,7 @@
 mod adaptive;
 mod boundary_fit;
 mod boundary_rows;
+mod bridges;
 mod bucket_grid;
 mod calibration;
 mod chords;

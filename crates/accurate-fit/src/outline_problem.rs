@@ -2,6 +2,7 @@ use accurate_geom::nalgebra::Vector3;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::FitError;
+use crate::bridges::Bridges;
 use crate::chords::Chords;
 use crate::nearest::NearestPoints;
 use crate::normal::NormalEquations;
@@ -81,8 +82,8 @@ pub(crate) struct Evaluation {
 #[derive(Debug, Clone)]
 pub(crate) struct OutlineProblem<'a> {
     pub(crate) outlines: [&'a OutlineData; 2],
-    /// Straight stretches, `[x0, y0, x1, y1]`, on which the curve may leave the mask.
-    pub(crate) bridges: [&'a [[f64; 4]]; 2],
+    /// Where the curve may leave the mask.
+    pub(crate) bridges: [&'a Bridges; 2],
     pub(crate) projectors: [Projector; 2],
     /// Chords per span: about 1.5 px each.
     pub(crate) steps: usize,

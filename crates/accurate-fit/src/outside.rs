@@ -6,14 +6,13 @@ use crate::outline_problem::{Evaluation, OutlineProblem, Row};
 use crate::projector::Projector;
 use crate::uniform_spline::basis;
 
-/// Distances beyond which a curve sample outside the mask is left alone, and within which it is
-/// taken to be inside, px.
-const OUTSIDE_PX: [f64; 2] = [1.2, 25.0];
+/// A curve sample so near to the mask is taken to be inside, px ...
+const NEAREST_OUTSIDE_PX: f64 = 1.2;
+/// ... and one farther than this is left alone, px.
+pub(crate) const FARTHEST_OUTSIDE_PX: f64 = 25.0;
 /// A curve sample outside the mask is left alone where the probability map doubts that it is, more
 /// than so much.
 const LEAST_DOUBT: f64 = 0.5;
-/// Half width of a bridge, px.
-const BRIDGE_HALF_PX: f64 = 4.0;
 
 impl OutlineProblem<'_> {
     /// Adds the rows of curve samples outside one view's mask, about one per chord.
@@ -24,7 +23,7 @@ impl OutlineProblem<'_> {
             // The pull needs a direction, not the last tenth of a pixel: it acts beyond 1.2 px.
             let seen = self.outlines[view].outside.nearest(p.x, p.y);
             let Some((distance, target)) = self.outside_from(view, p, seen) else { continue };
-            if distance <= OUTSIDE_PX[0] || distance > OUTSIDE_PX[1] {
+            if distance <= NEAREST_OUTSIDE_PX || distance > FARTHEST_OUTSIDE_PX {
                 continue;
             }
             if self.doubt(view, p) < LEAST_DOUBT {
@@ -59,7 +58,7 @@ impl OutlineProblem<'_> {
     }
 
     /// Distance and nearest allowed position of a curve sample that is not on the mask, on a bridge
-    /// or outside the image.
+    /// or outside the image; farther than [`FARTHEST_OUTSIDE_PX`] perhaps too large a distance.
     pub(crate) fn outside(&self, view: usize, p: &Vector2<f64>) -> Option<(f64, Vector2<f64>)> {
         let seen = self.outlines[view].outside.nearest_around(p.x, p.y);
         self.outside_from(view, p, seen)
@@ -85,14 +84,9 @@ impl OutlineProblem<'_> {
         }
         let mut target = Vector2::new(seen[0], seen[1]);
         let mut distance = (target - p).norm();
-        for &[x0, y0, x1, y1] in self.bridges[view] {
-            let (a, b) = (Vector2::new(x0, y0), Vector2::new(x1, y1));
-            let e = b - a;
-            let t = (p - a).dot(&e) / e.norm_squared().max(f64::MIN_POSITIVE);
-            let q = a + e * t.clamp(0.0, 1.0);
-            let to_bridge = (q - p).norm() - BRIDGE_HALF_PX;
+        for (to_bridge, place) in self.bridges[view].near(p) {
             if to_bridge < distance {
-                (distance, target) = (to_bridge, q);
+                (distance, target) = (to_bridge, place);
             }
         }
         (distance > 0.0).then_some((distance, target))

@@ -1,7 +1,9 @@
-use accurate_geom::{Curve3, Pixel, Point3, Rig, View, View1, View2};
+use accurate_geom::{Curve3, Pixel, Point3, Rig, View1, View2};
 
+use crate::bridges::Bridges;
 use crate::curve::{dense_points, from_curve};
 use crate::outline_problem::OutlineProblem;
+use crate::outside::FARTHEST_OUTSIDE_PX;
 use crate::projector::Projector;
 use crate::uniform_spline::UniformSpline;
 use crate::{FitError, Outline};
@@ -11,7 +13,7 @@ use crate::{FitError, Outline};
 pub struct OutlinePair<'a> {
     outline1: &'a Outline<View1>,
     outline2: &'a Outline<View2>,
-    bridges: [Vec<[f64; 4]>; 2],
+    bridges: [Bridges; 2],
 }
 
 impl<'a> OutlinePair<'a> {
@@ -27,17 +29,12 @@ impl<'a> OutlinePair<'a> {
         bridges1: &[(Pixel<View1>, Pixel<View1>)],
         bridges2: &[(Pixel<View2>, Pixel<View2>)],
     ) -> Self {
-        self.bridges = [flat(bridges1), flat(bridges2)];
+        self.bridges = [
+            Bridges::new(bridges1, self.outline1.data.size, FARTHEST_OUTSIDE_PX),
+            Bridges::new(bridges2, self.outline2.data.size, FARTHEST_OUTSIDE_PX),
+        ];
         self
     }
-}
-
-fn flat<V: View>(bridges: &[(Pixel<V>, Pixel<V>)]) -> Vec<[f64; 4]> {
-    bridges
-        .iter()
-        .filter(|(a, b)| a.is_finite() && b.is_finite())
-        .map(|(a, b)| [a.x, a.y, b.x, b.y])
-        .collect()
 }
 
 /// The problem of a curve and its outlines, and the curve with knots of the asked spacing.

@@ -45,6 +45,13 @@ pub(crate) fn read_bytes(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     Ok(bytes)
 }
 
+/// Bytes of a file as UTF-8 text, without a byte order mark.
+pub(crate) fn as_text<'b>(path: &Path, bytes: &'b [u8]) -> Result<&'b str, IoError> {
+    let text = std::str::from_utf8(bytes)
+        .map_err(|e| IoError::NotText { path: path.to_owned(), offset: e.valid_up_to() })?;
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
+}
+
 /// [`read_bytes`] as UTF-8 text, without a byte order mark.
 pub(crate) fn read_text(path: &Path, limit: u64) -> Result<String, IoError> {
     let mut text = String::from_utf8(read_bytes(path, limit)?).map_err(|e| IoError::NotText {

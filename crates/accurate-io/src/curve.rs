@@ -126,15 +126,17 @@ pub fn write_curve(path: &Path, curve: &CurveTable) -> Result<(), IoError> {
 /// Reads a curve in the format of the name's extension: what [`write_curve`] writes, and
 ///
 /// - `.csv` with columns `x`, `y`, `z` anywhere in its header and numbers in all others;
-/// - `.ply` ASCII or binary, float or double;
+/// - `.ply` ASCII or binary, float or double, with as many vertices as its header says;
 /// - `.npy` N x 3 of `f8` or `f4`;
 /// - `.vtp` with ASCII arrays and one polyline through all points in order;
-/// - `.mrk.json` with one markup, LPS or RAS, in mm.
+/// - `.mrk.json` with one markup, LPS or RAS, in mm. Control points that Slicer counts as not placed
+///   (`positionStatus` undefined, preview or missing) are left out, with their values, as Slicer
+///   leaves them out of its curve.
 ///
 /// `.npz` and `.parquet` are written, not read.
 ///
-/// A file that names no unit gives [`LengthUnit::Unit`]; a CSV file names it in the column
-/// `arc_length[..]`.
+/// A file that names no unit gives [`LengthUnit::Unit`], one that names another than mm, cm, m and
+/// `unit` is refused; a CSV file names it in the column `arc_length[..]`.
 ///
 /// # Errors
 /// [`IoError`] naming the file and the line, point or value; a declared size beyond the bytes of
@@ -226,6 +228,20 @@ mod tests {
                 assert!(!path.exists());
             }
         }
+    }
+
+    #[test]
+    fn a_csv_curve_in_a_unit_that_is_not_known_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("curve.csv");
+        let unit_of = |header: &str| {
+            std::fs::write(&path, format!("{header}\n1,2,3,0\n")).unwrap();
+            read_curve(&path).map(|curve| curve.unit)
+        };
+        assert_eq!(unit_of("x,y,z,arc_length[cm]").unwrap(), LengthUnit::Centimetre);
+        assert_eq!(unit_of("x,y,z,arc_length").unwrap(), LengthUnit::Unit);
+        let error = unit_of("x,y,z,arc_length[inch]").unwrap_err().to_string();
+        assert!(error.ends_with("arc_length = `inch`: expected mm, cm, m or unit"), "{error}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::atomic::write_atomically;
 use crate::curve::{Column, CurveTable, check_column_count};
 use crate::matrix::parse_number;
 use crate::points::CsvTable;
+use crate::unit::length_unit;
 
 /// The column whose unit is the unit of the points.
 const ARC_LENGTH: &str = "arc_length";
@@ -34,11 +35,10 @@ pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
         Ok(())
     })?;
     let columns: Vec<Column> = columns.into_iter().map(|(_, column)| column).collect();
-    let unit = columns
-        .iter()
-        .find(|c| c.name == ARC_LENGTH)
-        .and_then(|c| c.unit.parse().ok())
-        .unwrap_or(LengthUnit::Unit);
+    let unit = match columns.iter().find(|c| c.name == ARC_LENGTH) {
+        Some(column) if !column.unit.is_empty() => length_unit(path, ARC_LENGTH, &column.unit)?,
+        _ => LengthUnit::Unit,
+    };
     Ok(CurveTable { unit, points, columns })
 }
 

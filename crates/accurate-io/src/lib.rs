@@ -17,7 +17,10 @@
 //!   memory is taken, and whatever is wrong becomes an [`IoError`] with file, place and value.
 //! - No NaN or infinity is read or written.
 //! - Every file is written to a temporary name, synced and renamed ([`write_atomically`]).
-//! - What is written reads back to the same bits.
+//! - What is written reads back to the same bits, where the format can hold them. Three cannot, and
+//!   are off in the last digits: COLMAP (rotations as quaternions, pixels counted half a pixel off),
+//!   3 x 4 matrices (`K`, `R` and `t` are taken out of the product) and Slicer's millimetres for a
+//!   curve in cm or m.
 
 mod atomic;
 mod bounded;
@@ -49,6 +52,7 @@ mod parquet_file;
 mod ply;
 mod points;
 mod rig_file;
+mod unit;
 mod vtp;
 
 pub use atomic::{remove_unfinished, write_atomically};

@@ -10,6 +10,7 @@ use crate::atomic::write_atomically;
 use crate::bounded::{MAX_POINTS_BYTES, read_text};
 use crate::curve::{Column, CurveTable, check_column_count};
 use crate::matrix::finite;
+use crate::unit::length_unit;
 
 /// The identifier Slicer looks for; no file is fetched from there.
 const SCHEMA: &str = "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#";
@@ -42,11 +43,41 @@ struct Markup {
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct ControlPoint {
-    id: String,
-    label: String,
-    position: [f64; 3],
     #[serde(default)]
-    position_status: String,
+    id: String,
+    #[serde(default)]
+    label: String,
+    #[serde(default)]
+    position: Position,
+    #[serde(default)]
+    position_status: PositionStatus,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum Position {
+    At([f64; 3]),
+    /// Slicer writes an empty text where a point is not placed.
+    Nowhere(String),
+}
+
+impl Default for Position {
+    fn default() -> Self {
+        Self::Nowhere(String::new())
+    }
+}
+
+/// Whether a point has a place. Only [`Self::Defined`] ones belong to the curve: the others are
+/// waiting to be placed, follow the mouse, or were skipped because there is nothing to see.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum PositionStatus {
+    /// Also of files that say nothing, as Slicer takes them.
+    #[default]
+    Defined,
+    Undefined,
+    Preview,
+    Missing,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -90,8 +121,8 @@ pub(crate) fn write(path: &Path, curve: &CurveTable) -> Result<(), IoError> {
         control_points.push(ControlPoint {
             id: (i + 1).to_string(),
             label: (i + 1).to_string(),
-            position,
-            position_status: "defined".to_owned(),
+            position: Position::At(position),
+            position_status: PositionStatus::Defined,
         });
     }
     let measurements = curve
@@ -151,26 +182,36 @@ pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
     }
     let unit = match &markup.world_unit {
         None => LengthUnit::Millimetre,
-        Some(label) => label
-            .parse()
-            .map_err(|_| IoError::field(path, "worldUnit", label, "expected mm, cm, m or unit"))?,
+        Some(label) => length_unit(path, "worldUnit", label)?,
     };
     let scale = millimetres_per(unit);
-    let points = markup
+    let placed: Vec<bool> = markup
         .control_points
         .iter()
-        .map(|c| {
-            let [x, y, z] = c.position;
-            Point3::new(sign * x / scale, sign * y / scale, z / scale)
-        })
+        .map(|c| c.position_status == PositionStatus::Defined)
         .collect();
+    let mut points = Vec::new();
+    for (i, control) in markup.control_points.iter().enumerate().filter(|(i, _)| placed[*i]) {
+        let Position::At([x, y, z]) = control.position else {
+            let reason = "expected three numbers for a point whose positionStatus is defined";
+            return Err(IoError::field(path, format!("controlPoints[{i}].position"), "", reason));
+        };
+        points.push(Point3::new(sign * x / scale, sign * y / scale, z / scale));
+    }
     // Slicer's own summaries (length, curvature) have no value per point.
     let per_point: Vec<Measurement> =
         markup.measurements.into_iter().filter(|m| !m.control_point_values.is_empty()).collect();
     check_column_count(path, per_point.len())?;
     let columns = per_point
         .into_iter()
-        .map(|m| Column { name: m.name, unit: m.units, values: m.control_point_values })
+        .map(|mut m| {
+            // One value per control point, placed or not.
+            if m.control_point_values.len() == placed.len() {
+                let mut placed = placed.iter();
+                m.control_point_values.retain(|_| placed.next().is_some_and(|placed| *placed));
+            }
+            Column { name: m.name, unit: m.units, values: m.control_point_values }
+        })
         .collect();
     Ok(CurveTable { unit, points, columns })
 }
@@ -193,6 +234,39 @@ mod tests {
         let curve = read_text_of(text).unwrap();
         assert_eq!(curve.points, [Point3::new(-1.0, -2.0, 3.0)]);
         assert_eq!(curve.unit, LengthUnit::Millimetre);
+    }
+
+    #[test]
+    fn points_that_slicer_has_not_placed_are_left_out_with_their_values() {
+        let of = |points: &str| {
+            format!(
+                r#"{{"@schema": "x", "markups": [{{"type": "Curve", "coordinateSystem": "LPS",
+                "controlPoints": [{points}], "measurements": [{{"name": "radius", "units": "mm",
+                "controlPointValues": [1, 2, 3, 4, 5, 6]}}]}}]}}"#
+            )
+        };
+        // As Slicer writes them, but for the preview with a place.
+        let text =
+            of(r#"{"id": "1", "label": "a", "position": [1, 2, 3], "positionStatus": "defined"},
+            {"id": "2", "label": "b", "position": "", "positionStatus": "undefined"},
+            {"id": "3", "label": "c", "position": [7, 8, 9], "positionStatus": "preview"},
+            {"id": "4", "label": "d", "position": "", "positionStatus": "missing"},
+            {"id": "5", "label": "e", "position": [0, 0, 0], "positionStatus": "undefined"},
+            {"position": [4, 5, 6]}"#);
+        let curve = read_text_of(&text).unwrap();
+        assert_eq!(curve.points, [Point3::new(1.0, 2.0, 3.0), Point3::new(4.0, 5.0, 6.0)]);
+        assert_eq!(curve.columns[0].values, [1.0, 6.0]);
+        for (point, expected) in [
+            (
+                r#"{"position": [1, 2, 3], "positionStatus": "guessed"}"#,
+                "unknown variant `guessed`",
+            ),
+            (r#"{"position": "", "positionStatus": "defined"}"#, "controlPoints[0].position"),
+            (r#"{"position": [1, 2], "positionStatus": "defined"}"#, "Slicer Markups"),
+        ] {
+            let error = read_text_of(&of(point)).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
     }
 
     #[test]

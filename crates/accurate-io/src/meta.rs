@@ -7,6 +7,7 @@ use serde_json::Value;
 use crate::IoError;
 use crate::bounded::{MAX_SMALL_BYTES, read_text};
 use crate::image_file::MAX_IMAGE_SIDE_PX;
+use crate::unit::length_unit;
 
 /// `meta.json` of a pair folder. Every field may be missing; unknown fields are ignored.
 #[derive(Debug, Default, Serialize, Deserialize)]
@@ -77,11 +78,7 @@ impl Meta {
 
     /// The unit of the world; files of the paper's public set name none.
     pub(crate) fn unit(&self, path: &Path) -> Result<LengthUnit, IoError> {
-        self.unit.as_deref().map_or(Ok(LengthUnit::Unit), |label| {
-            label
-                .parse()
-                .map_err(|_| IoError::field(path, "unit", label, "expected mm, cm, m or unit"))
-        })
+        self.unit.as_deref().map_or(Ok(LengthUnit::Unit), |label| length_unit(path, "unit", label))
     }
 
     pub(crate) fn source(&self) -> Option<String> {

@@ -13,6 +13,7 @@ use crate::atomic::write_atomically;
 use crate::bounded::{MAX_POINTS_BYTES, read_bytes};
 use crate::curve::{Column, CurveTable, check_column_count};
 use crate::matrix::{finite, parse_number};
+use crate::unit::length_unit;
 
 /// How numbers are stored in a PLY file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -29,9 +30,10 @@ pub enum PlyEncoding {
 /// either byte order, float, double or integer. Other elements and properties are skipped.
 ///
 /// # Errors
-/// [`IoError::Malformed`]; [`IoError::TooLarge`] if the header declares more elements than the file
-/// has bytes for, before memory is taken; [`IoError::NotFinite`]; [`IoError::Empty`];
-/// [`IoError::Missing`].
+/// [`IoError::Malformed`], also for a vertex with more numbers than properties and for bytes behind
+/// the declared vertices where no other element follows; [`IoError::TooLarge`] if the header declares
+/// more elements than the file has bytes for, before memory is taken; [`IoError::NotFinite`];
+/// [`IoError::Empty`]; [`IoError::Missing`].
 pub fn read_ply_points(path: &Path) -> Result<Vec<Point3>, IoError> {
     let (points, _) = parse(path)?;
     for (i, p) in points.iter().enumerate() {
@@ -73,7 +75,7 @@ pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
     for comment in comments {
         let mut words = comment.trim().splitn(3, ' ');
         match (words.next(), words.next(), words.next()) {
-            (Some("unit"), Some(label), None) => unit = label.parse().unwrap_or(unit),
+            (Some("unit"), Some(label), None) => unit = length_unit(path, "comment unit", label)?,
             (Some("column"), Some(name), Some(label)) => {
                 if let Some(column) = columns.iter_mut().find(|c| c.name == name) {
                     column.unit = label.trim().to_owned();
@@ -157,7 +159,7 @@ fn parse(path: &Path) -> Result<(Vec<Point3>, Rest), IoError> {
 
     let rows = match header.encoding {
         Encoding::Ascii => ascii_rows(path, reader.into_inner(), line_of_data, &header, vertex)?,
-        _ => binary_rows(reader, &header).map_err(|reason| malformed(None, &reason))?,
+        _ => binary_rows(path, reader, &header, vertex)?,
     };
     let mut points = Vec::with_capacity(rows.len());
     let mut columns: Vec<Column> = scalars
@@ -253,7 +255,35 @@ fn ascii_rows(
             break;
         }
     }
+    if is_last(vertex, header) {
+        check_end(path, rest_of(&data), vertex)?;
+    }
     Ok(rows)
+}
+
+/// Whether nothing but vertices may stand behind the first of them.
+fn is_last(vertex: &ElementDef, header: &Header) -> bool {
+    header.elements.values().next_back().is_some_and(|element| element.name == vertex.name)
+}
+
+fn rest_of<'b>(data: &Cursor<&'b [u8]>) -> &'b [u8] {
+    let position = usize::try_from(data.position()).unwrap_or(usize::MAX);
+    data.get_ref().get(position..).unwrap_or_default()
+}
+
+/// Refuses what stands behind the last vertex that the header counts: a count that is too low would
+/// cut the curve off.
+fn check_end(path: &Path, rest: &[u8], vertex: &ElementDef) -> Result<(), IoError> {
+    // Empty lines at the end mean nothing.
+    if rest.iter().all(u8::is_ascii_whitespace) {
+        return Ok(());
+    }
+    let reason = format!(
+        "{} bytes behind the {} vertices that the header declares",
+        rest.len(),
+        vertex.count
+    );
+    Err(IoError::malformed(path, "PLY", None, reason))
 }
 
 fn ascii_row(
@@ -282,23 +312,34 @@ fn ascii_row(
             }
         }
     }
+    if let Some((column, _)) = fields.next() {
+        let reason = format!("more numbers than the {column} that the header declares");
+        return Err(IoError::malformed(path, "PLY", Some(line), reason));
+    }
     Ok(row)
 }
 
 fn binary_rows(
+    path: &Path,
     mut reader: Reader<Cursor<&[u8]>>,
     header: &Header,
-) -> Result<Vec<Vec<f64>>, String> {
+    vertex: &ElementDef,
+) -> Result<Vec<Vec<f64>>, IoError> {
     let parser = Parser::<Scalars>::new();
-    for (name, element) in &header.elements {
-        let rows = parser
-            .read_payload_for_element(&mut reader, element, header)
-            .map_err(|e| e.to_string().replace("\n\t", " "))?;
-        if name == "vertex" {
-            return Ok(rows.into_iter().map(|r| r.0).collect());
+    let mut rows = Vec::new();
+    for (_, element) in &header.elements {
+        let read = parser.read_payload_for_element(&mut reader, element, header).map_err(|e| {
+            IoError::malformed(path, "PLY", None, e.to_string().replace("\n\t", " "))
+        })?;
+        if element.name == vertex.name {
+            rows = read.into_iter().map(|row| row.0).collect();
+            break;
         }
     }
-    Ok(Vec::new())
+    if is_last(vertex, header) {
+        check_end(path, rest_of(&reader.into_inner()), vertex)?;
+    }
+    Ok(rows)
 }
 
 /// The scalar properties of an element in the order of the header; lists are dropped.
@@ -374,6 +415,47 @@ mod tests {
     }
 
     #[test]
+    fn a_count_below_the_vertices_of_a_file_is_refused() {
+        let head = |format: &str, further: &str| {
+            format!(
+                "ply\nformat {format} 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+                 property float z\n{further}end_header\n"
+            )
+        };
+        let binary = |vertices: u8| {
+            let mut bytes = head("binary_little_endian", "").into_bytes();
+            bytes.extend((0..3 * vertices).flat_map(|v| f32::from(v).to_le_bytes()));
+            bytes
+        };
+        assert_eq!(read_raw(&binary(1)).unwrap().len(), 1);
+        let error = read_raw(&binary(2)).unwrap_err().to_string();
+        assert!(error.contains("12 bytes behind the 1 vertices"), "{error}");
+        let text = head("ascii", "") + "1 2 3\n\n \r\n";
+        assert_eq!(read_raw(text.as_bytes()).unwrap().len(), 1, "empty lines at the end");
+        let face = "element face 1\nproperty list uchar int vertex_indices\n";
+        let text = head("ascii", face) + "1 2 3\n3 0 0 0\n";
+        assert_eq!(read_raw(text.as_bytes()).unwrap().len(), 1, "another element follows");
+    }
+
+    #[test]
+    fn a_unit_that_is_not_known_is_refused_and_prose_is_not_taken_for_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("curve.ply");
+        let read_with = |comment: &str| {
+            let text = format!(
+                "ply\nformat ascii 1.0\ncomment {comment}\nelement vertex 1\nproperty float x\n\
+                 property float y\nproperty float z\nend_header\n1 2 3\n"
+            );
+            fs::write(&path, text).unwrap();
+            read(&path).map(|curve| curve.unit)
+        };
+        assert_eq!(read_with("unit cm").unwrap(), LengthUnit::Centimetre);
+        assert_eq!(read_with("unit square of a board").unwrap(), LengthUnit::Unit);
+        let error = read_with("unit inch").unwrap_err().to_string();
+        assert!(error.ends_with("comment unit = `inch`: expected mm, cm, m or unit"), "{error}");
+    }
+
+    #[test]
     fn a_count_beyond_the_file_is_refused_before_memory_is_taken() {
         for (format, property) in [
             ("ascii", "property float x"),
@@ -400,6 +482,11 @@ mod tests {
             ("1 nan 3\n", "line 8, column 2 is not finite: NaN"),
             ("1 2 x\n", "line 8, column 3: `x` is not a number"),
             ("1 22222\n", "line 8: not valid PLY: too few numbers"),
+            (
+                "1 2 3 4\n",
+                "line 8: not valid PLY: more numbers than the 3 that the header declares",
+            ),
+            ("1 2 3\n4 5 6\n", "6 bytes behind the 1 vertices that the header declares"),
         ];
         for (data, expected) in cases {
             let error = read_raw(format!("{head}{data}").as_bytes()).unwrap_err().to_string();

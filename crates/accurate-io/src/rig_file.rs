@@ -8,6 +8,7 @@ use crate::IoError;
 use crate::atomic::write_atomically;
 use crate::bounded::{MAX_SMALL_BYTES, read_text};
 use crate::json::write_json;
+use crate::unit::length_unit;
 
 /// The schema of `rig.toml` and `rig.json`; see [`read_rig`].
 #[derive(Serialize, Deserialize)]
@@ -31,7 +32,8 @@ struct ViewFile {
     distortion: Option<[f64; 5]>,
 }
 
-/// Reads two cameras from a TOML or JSON file (by extension). Both have the fields
+/// Reads two cameras from a TOML or JSON file: JSON begins with a brace, which TOML cannot. Both have
+/// the fields
 ///
 /// ```toml
 /// unit = "mm"                     # mm, cm, m or unit
@@ -49,30 +51,55 @@ struct ViewFile {
 ///
 /// # Errors
 /// [`IoError::Malformed`] with the line; [`IoError::Field`] for an unknown unit;
-/// [`IoError::Geometry`] naming the view; [`IoError::UnknownExtension`], [`IoError::Missing`],
-/// [`IoError::TooLarge`] above 1 MiB.
+/// [`IoError::Geometry`] naming the view; [`IoError::Missing`], [`IoError::TooLarge`] above 1 MiB.
 pub fn read_rig(path: &Path) -> Result<Rig, IoError> {
-    let format = Format::of(path)?;
-    let text = read_text(path, MAX_SMALL_BYTES)?;
-    let file: RigFile = match format {
-        Format::Toml => toml::from_str(&text).map_err(|e| {
-            let line = e.span().map(|span| line_at(&text, span.start));
+    parse_rig(path, &read_text(path, MAX_SMALL_BYTES)?)
+}
+
+/// [`read_rig`] of the text of `path`.
+pub(crate) fn parse_rig(path: &Path, text: &str) -> Result<Rig, IoError> {
+    let file: RigFile = if text.trim_start().starts_with('{') {
+        serde_json::from_str(text)
+            .map_err(|e| IoError::malformed(path, "JSON rig", Some(e.line()), e.to_string()))?
+    } else {
+        toml::from_str(text).map_err(|e| {
+            let line = e.span().map(|span| line_at(text, span.start));
             IoError::malformed(path, "TOML rig", line, e.message())
-        })?,
-        Format::Json => serde_json::from_str(&text)
-            .map_err(|e| IoError::malformed(path, "JSON rig", Some(e.line()), e.to_string()))?,
+        })?
     };
-    let unit = file
-        .unit
-        .parse()
-        .map_err(|_| IoError::field(path, "unit", &file.unit, "expected mm, cm, m or unit"))?;
+    let unit = length_unit(path, "unit", &file.unit)?;
     let geometry = |part| move |source| IoError::Geometry { path: path.to_owned(), part, source };
     let camera1 = file.view1.camera(path, "view 1")?;
     let camera2 = file.view2.camera(path, "view 2")?;
     Rig::new(camera1, camera2, unit).map_err(geometry("rig"))
 }
 
-/// Writes two cameras as TOML or JSON (by extension); reading them gives the same bits.
+/// Whether a text is a rig file rather than another file of cameras: it has a key `view1` or `view2`.
+///
+/// Nothing is parsed, so that a rig with a mistake in it is told from no rig at all.
+pub(crate) fn looks_like_rig(text: &str) -> bool {
+    let names = ["view1", "view2"];
+    let head = text.trim_start();
+    if head.starts_with('{') {
+        // A key, not a value: a view may be called so.
+        let is_key = |rest: &str| rest.trim_start().starts_with(':');
+        return names.iter().any(|n| text.split(&format!("\"{n}\"")).skip(1).any(is_key));
+    }
+    if head.strip_prefix('[').is_some_and(|rest| rest.trim_start().starts_with('{')) {
+        // An array of JSON objects.
+        return false;
+    }
+    // `[view1]`, `[ "view1" ]`, `view1 = {`, `view1.K =`: a key of TOML stands first on its line.
+    let mark = |c: char| c.is_whitespace() || matches!(c, '"' | '\'');
+    let ends = |rest: &str| rest.trim_start_matches(mark).starts_with([']', '=', '.']);
+    let is_head = |line: &str| {
+        let key = line.trim_start_matches(|c| c == '[' || mark(c));
+        names.iter().any(|name| key.strip_prefix(name).is_some_and(ends))
+    };
+    text.lines().any(is_head)
+}
+
+/// Writes two cameras as TOML or JSON (by extension, in any case); reading them gives the same bits.
 ///
 /// # Errors
 /// [`IoError::UnknownExtension`], [`IoError::System`].
@@ -128,7 +155,8 @@ enum Format {
 
 impl Format {
     fn of(path: &Path) -> Result<Self, IoError> {
-        match path.extension().and_then(|e| e.to_str()) {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
             Some("toml") => Ok(Self::Toml),
             Some("json") => Ok(Self::Json),
             _ => Err(IoError::UnknownExtension { path: path.to_owned(), expected: ".toml, .json" }),
@@ -198,7 +226,23 @@ distortion = [0, 0, 0, 0, 0]
         let same_centre = GOOD.replace("t = [0, 0, 720.5]", "t = [-1200, 0, 0]");
         let error = read(&same_centre, "rig.toml").unwrap_err().to_string();
         assert!(error.contains("rig: zero baseline"), "{error}");
-        assert!(matches!(read(GOOD, "rig.yaml"), Err(IoError::UnknownExtension { .. })));
+    }
+
+    #[test]
+    fn the_name_says_how_a_rig_is_written_but_not_how_it_is_read() {
+        let rig = read(GOOD, "rig.toml").unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let written = |name: &str| {
+            let path = folder.path().join(name);
+            write_rig(&path, &rig).map(|()| fs::read_to_string(path).unwrap())
+        };
+        let (toml, json) = (written("A.TOML").unwrap(), written("a.json").unwrap());
+        assert!(toml.starts_with("unit") && json.starts_with('{'));
+        for name in ["rig.txt", "cams.cfg", "X.TOML", "rig", "rig.json", "rig.toml"] {
+            assert_eq!(read(&toml, name).unwrap(), rig, "{name}");
+            assert_eq!(read(&json, name).unwrap(), rig, "{name}");
+        }
+        assert!(matches!(written("rig.yaml"), Err(IoError::UnknownExtension { .. })));
     }
 
     #[test]

@@ -10,6 +10,7 @@ use crate::atomic::write_atomically;
 use crate::bounded::{MAX_POINTS_BYTES, read_text};
 use crate::curve::{Column, CurveTable, check_column_count};
 use crate::matrix::parse_number;
+use crate::unit::length_unit;
 
 /// Field array with the unit of the points.
 const UNIT: &str = "unit";
@@ -286,7 +287,7 @@ impl<'a> Document<'a> {
         let mut unit = LengthUnit::Unit;
         for (name, text) in &self.texts {
             if name == UNIT {
-                unit = text.parse().unwrap_or(unit);
+                unit = length_unit(self.path, UNIT, text)?;
             } else if let Some(of) = name.strip_prefix(UNIT_OF)
                 && let Some(column) = self.columns.iter_mut().find(|c| c.name == of)
             {
@@ -383,6 +384,7 @@ mod tests {
             ("\"PolyData\"", "\"ImageData\"", "line 2: not valid VTP: expected <VTKFile"),
             ("NumberOfComponents=\"3\"", "NumberOfComponents=\"2\"", "2 components in Points"),
             ("4 5e-1", "4 5e-1 6", "7 coordinates"),
+            ("99 109 0", "105 110 99 104 0", "unit = `inch`: expected mm, cm, m or unit"),
             ("4 5e-1", "4 NaN", "line 23, column 2 is not finite"),
             ("</Points>", "</Point>", "not valid VTP"),
             ("<PolyData>", "<!DOCTYPE a [<!ENTITY b \"c\">]><PolyData>", "entities"),

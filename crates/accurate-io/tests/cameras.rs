@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use accurate_geom::nalgebra::{Matrix3, Rotation3, Vector3};
 use accurate_geom::{Camera, Distortion, ImageSize, LengthUnit};
-use accurate_io::{CameraFormat, IoError, NamedView, ViewDefaults, read_cameras, write_cameras};
+use accurate_io::{
+    CameraFormat, IoError, NamedView, ViewDefaults, is_dicom, read_cameras, write_cameras,
+};
 use proptest::prelude::*;
 
 fn views() -> impl Strategy<Value = Vec<NamedView>> {
@@ -15,11 +17,12 @@ fn views() -> impl Strategy<Value = Vec<NamedView>> {
         prop::array::uniform4(200.0..3000.0f64),
         prop::array::uniform4(-0.1..0.1f64),
         any::<bool>(),
+        prop::sample::select(vec![(512, 400), (1024, 768)]),
     )
-        .prop_map(|(turn, t, k, d, lens)| {
+        .prop_map(|(turn, t, k, d, lens, (width, height))| {
             let r = *Rotation3::new(Vector3::from(turn)).matrix();
             let k = Matrix3::new(k[0], 0.0, k[2], 0.0, k[1], k[3], 0.0, 0.0, 1.0);
-            let size = ImageSize { width: 512, height: 400 };
+            let size = ImageSize { width, height };
             let camera = Camera::new(k, r, Vector3::from(t), size).unwrap();
             let [k1, k2, p1, p2] = d;
             let lens = lens.then_some(Distortion { k1, k2, p1, p2, k3: 0.0 });
@@ -71,6 +74,7 @@ proptest! {
             prop_assert!((a.camera.k() - b.camera.k()).amax() < tolerance);
             prop_assert!((a.camera.r() - b.camera.r()).amax() < 64.0 * f64::EPSILON);
             prop_assert_eq!(a.camera.t(), b.camera.t());
+            prop_assert_eq!(a.camera.size(), b.camera.size());
             prop_assert_eq!(a.camera.distortion(), b.camera.distortion());
         }
     }
@@ -148,6 +152,7 @@ fn what_is_missing_or_not_understood_is_named() {
         ("p.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n".into(), "states no image size"),
         ("m.json", "{\"CameraParameters1\": {}}".into(), "RotationOfCamera2"),
         ("m.json", "{\"a\": 1}".into(), "without the fields of a known camera"),
+        ("images.txt", "# no image\n".into(), "missing file"),
         ("m.bin", "hello".into(), "no known camera file (it begins with `hello`)"),
     ];
     for (name, text, expected) in cases {
@@ -280,5 +285,237 @@ fn arrays_that_are_no_matrices_are_refused() {
         std::fs::write(&path, bytes).unwrap();
         let error = read_cameras(&[path], &defaults).unwrap_err().to_string();
         assert!(error.contains(expected), "{name}: {error}");
+    }
+}
+
+/// Two cameras 90 degrees apart.
+fn two_views(sizes: [(u32, u32); 2]) -> Vec<NamedView> {
+    let view = |angle: f64, (width, height): (u32, u32)| {
+        let k = Matrix3::new(900.0, 0.0, 255.5, 0.0, 910.0, 254.25, 0.0, 0.0, 1.0);
+        let r = *Rotation3::from_axis_angle(&Vector3::y_axis(), angle).matrix();
+        let size = ImageSize { width, height };
+        NamedView {
+            name: "v".into(),
+            camera: Camera::new(k, r, Vector3::new(1.0, 2.0, 700.0), size).unwrap(),
+            unit: LengthUnit::Millimetre,
+            frame: "as in the file".into(),
+            notes: vec![],
+        }
+    };
+    vec![view(0.0, sizes[0]), view(1.5, sizes[1])]
+}
+
+fn cameras(views: &[NamedView]) -> Vec<&Camera> {
+    views.iter().map(|view| &view.camera).collect()
+}
+
+#[test]
+fn opencv_files_keep_two_sizes_and_write_one_size_plainly() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, format) in [("c.yml", CameraFormat::OpencvYaml), ("c.xml", CameraFormat::OpencvXml)]
+    {
+        let path = folder.path().join(name);
+        let differing = two_views([(512, 512), (1024, 768)]);
+        write_cameras(&path, &differing, format).unwrap();
+        let read = read_cameras(std::slice::from_ref(&path), &MM).unwrap();
+        assert_eq!(cameras(&read), cameras(&differing), "{name}");
+        let same = two_views([(512, 400); 2]);
+        write_cameras(&path, &same, format).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains("image_width") && !text.contains("image_width1"), "{text}");
+        assert_eq!(cameras(&read_cameras(&[path], &MM).unwrap()), cameras(&same), "{name}");
+    }
+}
+
+#[test]
+fn an_image_size_must_be_whole_positive_and_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let opencv = |size: &str| {
+        let path = folder.path().join("c.yml");
+        let k = "[ 900., 0., 320., 0., 900., 240., 0., 0., 1. ]";
+        let k = format!("K: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: {k}\n");
+        std::fs::write(&path, format!("%YAML:1.0\n---\n{k}{size}\n")).unwrap();
+        read_cameras(&[path], &MM).map(|views| views[0].camera.size())
+    };
+    let matlab = |size: &str| {
+        let path = folder.path().join("stereo.json");
+        let camera = format!(r#"{{"K": [[800,0,321],[0,810,241],[0,0,1]], "ImageSize": {size}}}"#);
+        let text = format!(
+            r#"{{"CameraParameters1": {camera}, "CameraParameters2": {camera},
+                "RotationOfCamera2": [[0,1,0],[-1,0,0],[0,0,1]], "TranslationOfCamera2": [5,6,7]}}"#
+        );
+        std::fs::write(&path, text).unwrap();
+        read_cameras(&[path], &MM).map(|views| views[0].camera.size())
+    };
+    let vga = ImageSize { width: 640, height: 480 };
+    assert_eq!(opencv("image_size: [ 640, 480 ]").unwrap(), vga);
+    let matrix =
+        "image_size: !!opencv-matrix\n   rows: 2\n   cols: 1\n   dt: i\n   data: [ 640, 480 ]";
+    assert_eq!(opencv(matrix).unwrap(), vga);
+    assert_eq!(matlab("[480, 640]").unwrap(), vga);
+    let whole = "expected a whole number of px from 1 to 1000000";
+    for (found, value, expected) in [
+        (opencv("image_size: [ 640.7, 480.2 ]"), "image_size = `640.7`", whole),
+        (opencv("image_size: [ 1e30, 480 ]"), "image_size = `1000000", whole),
+        (opencv("image_size: [ 640, 0 ]"), "image_size = `0`", whole),
+        (opencv("imageSize: [ 640, -480 ]"), "imageSize = `-480`", whole),
+        (opencv("image_size: [ 640, .Nan ]"), "image_size", "expected"),
+        (opencv("image_size: \"640x480\""), "image_size", "expected [width, height]"),
+        (opencv("image_width: 640.5\nimage_height: 480"), "image_width = `640.5`", whole),
+        (matlab("[480.5, 640]"), "ImageSize = `480.5`", whole),
+        (matlab("[480, 1e12]"), "ImageSize = `1000000000000`", whole),
+        (matlab("[480, 640, 3]"), "ImageSize", "expected [rows, columns], found 3 numbers"),
+    ] {
+        let error = found.unwrap_err();
+        assert!(matches!(error, IoError::Field { .. }), "{error}");
+        let error = error.to_string();
+        assert!(error.contains(value) && error.contains(expected), "{error}");
+    }
+    assert!(matlab("[]").unwrap_err().to_string().contains("states no image size"));
+}
+
+const COLMAP_CAMERAS: &str = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS\n\
+    1 PINHOLE 640 480 900 900 320 240\n2 SIMPLE_RADIAL 800 600 950 400 300 0.1\n";
+
+#[test]
+fn colmap_images_are_read_with_and_without_their_lines_of_points() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("cameras.txt"), COLMAP_CAMERAS).unwrap();
+    let names_of = |images: &str| {
+        std::fs::write(folder.path().join("images.txt"), images).unwrap();
+        let views = read_cameras(&[folder.path().to_owned()], &MM)?;
+        Ok(views.into_iter().map(|view| view.name).collect::<Vec<_>>())
+    };
+    // A name that is a number, one with blanks, and one that a parser may take for a number.
+    let images = ["1 1 0 0 0 1 2 3 1 0001", "2 0 1 0 0 4 5 6 2 b c.png", "3 0 0 1 0 7 8 9 1 nan"];
+    let points = ["", "1.5 2 -1 3 4 17", "1.5 2 -1"];
+    let expected = ["0001", "b c.png", "nan"];
+    // Every choice of: no line, an empty one, points.
+    for choice in 0..27_usize {
+        let mut text = String::from("# IMAGE_ID ...\n");
+        for (i, image) in images.iter().enumerate() {
+            text += &format!("{image}\n");
+            text += &match choice / 3_usize.pow(i as u32) % 3 {
+                0 => String::new(),
+                1 => "\n".to_owned(),
+                _ => format!("{}\n", points[i]),
+            };
+        }
+        let names: Result<Vec<String>, IoError> = names_of(&text);
+        assert_eq!(names.unwrap(), expected, "{text}");
+    }
+    let cut = format!("{}\n1.5 2 -1 3\n{}\n", images[0], images[1]);
+    let error = names_of(&cut).unwrap_err().to_string();
+    assert!(error.contains("line 2: not valid COLMAP text: expected IMAGE_ID"), "{error}");
+}
+
+#[test]
+fn the_two_files_of_colmap_may_have_any_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let cameras = write("lenses.txt", COLMAP_CAMERAS);
+    let images = write("poses.dat", "7 1 0 0 0 1 2 3 2 a.png\n");
+    let size = |paths: &[PathBuf]| read_cameras(paths, &MM).map(|views| views[0].camera.size());
+    let both = [images.clone(), cameras.clone()];
+    assert_eq!(size(&both).unwrap(), ImageSize { width: 800, height: 600 });
+    // Alone, each looks for the other by its usual name.
+    let error = size(std::slice::from_ref(&cameras)).unwrap_err();
+    assert!(matches!(&error, IoError::Missing { path, .. } if path.ends_with("images.txt")));
+    let usual = write("cameras.txt", "2 PINHOLE 20 10 9 9 10 5\n");
+    assert_eq!(size(&[images]).unwrap(), ImageSize { width: 20, height: 10 });
+    let error = size(&[cameras, usual]).unwrap_err().to_string();
+    assert!(error.contains("cameras.txt") && error.contains("lenses.txt"), "{error}");
+}
+
+#[test]
+fn a_camera_file_is_told_by_its_content_under_any_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let views = two_views([(512, 400), (1024, 768)]);
+    let named = |name: &str| folder.path().join(name);
+    for (name, format) in [
+        ("c.yml", CameraFormat::OpencvYaml),
+        ("c.xml", CameraFormat::OpencvXml),
+        ("c.toml", CameraFormat::Rig),
+        ("c.json", CameraFormat::Rig),
+        ("v.json", CameraFormat::ViewsJson),
+    ] {
+        write_cameras(&named(name), &views, format).unwrap();
+        for other in ["rig.txt", "cams.cfg", "X.TOML", "a.json", "b", "cameras.txt", "images.txt"] {
+            std::fs::copy(named(name), named(other)).unwrap();
+            let read = read_cameras(&[named(other)], &MM).unwrap();
+            assert_eq!(cameras(&read), cameras(&views), "{name} as {other}");
+        }
+    }
+    // A view may be called as a rig's key.
+    let view = NamedView { name: "view1".into(), ..views[0].clone() };
+    let text = view.to_json().unwrap().to_string();
+    std::fs::write(named("one.json"), text).unwrap();
+    assert_eq!(read_cameras(&[named("one.json")], &MM).unwrap()[0].name, "view1");
+}
+
+#[test]
+fn every_way_to_write_a_rig_in_toml_is_known_for_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let fields = |x: &str| {
+        [
+            "image_size = [512, 400]".to_owned(),
+            "K = [[900, 0, 256], [0, 900, 200], [0, 0, 1]]".to_owned(),
+            "R = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]".to_owned(),
+            format!("t = [{x}, 0, 700]"),
+        ]
+    };
+    let (one, two) = (fields("0"), fields("90"));
+    let dotted =
+        |name: &str, f: &[String]| f.iter().map(|f| format!("{name}.{f}\n")).collect::<String>();
+    let tables = |a: &str, b: &str| {
+        format!("unit = 'cm'\n{a}\n{}\n{b}\n{}\n", one.join("\n"), two.join("\n"))
+    };
+    let (inline1, inline2) = (one.join(", "), two.join(", "));
+    for text in [
+        tables("[view1] # left", "[view2] # right"),
+        tables("  [ view1 ]", "[ \"view2\" ]"),
+        tables("['view1']", "[view2]#right"),
+        format!("view1 = {{ {inline1} }}\nview2 = {{ {inline2} }}\nunit = \"cm\"\n"),
+        format!("\"view1\"={{{inline1}}}\nunit = \"cm\"\n[view2]\n{}", two.join("\n")),
+        format!("unit = \"cm\"\n{}{}", dotted("view1", &one), dotted("view2", &two)),
+    ] {
+        let path = folder.path().join("rig.txt");
+        std::fs::write(&path, &text).unwrap();
+        let views = read_cameras(&[path], &ViewDefaults::default())
+            .unwrap_or_else(|error| panic!("{error}\n{text}"));
+        assert_eq!((views.len(), views[1].camera.t().x), (2, 90.0), "{text}");
+        assert_eq!(views[0].unit, LengthUnit::Centimetre);
+    }
+    // A mistake in it is named, with its line.
+    let path = folder.path().join("rig.txt");
+    std::fs::write(&path, "unit = 'cm'\n[view1]\nimage_size = 5\n").unwrap();
+    let error = read_cameras(&[path], &MM).unwrap_err().to_string();
+    assert!(error.contains("line 3: not valid TOML rig"), "{error}");
+}
+
+#[cfg(unix)]
+#[test]
+fn cameras_come_through_a_pipe() {
+    let folder = tempfile::tempdir().unwrap();
+    let views = two_views([(512, 400), (1024, 768)]);
+    for (name, format) in [
+        ("c.toml", CameraFormat::Rig),
+        ("c.yml", CameraFormat::OpencvYaml),
+        ("c.json", CameraFormat::ViewsJson),
+    ] {
+        let file = folder.path().join(name);
+        write_cameras(&file, &views, format).unwrap();
+        let pipe = folder.path().join(format!("{name}.pipe"));
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        assert!(!is_dicom(&pipe).unwrap(), "looking into a pipe would wait for a writer");
+        let (from, to) = (std::fs::read(&file).unwrap(), pipe.clone());
+        let writer = std::thread::spawn(move || std::fs::write(to, from));
+        let read = read_cameras(&[pipe], &MM).unwrap();
+        writer.join().unwrap().unwrap();
+        assert_eq!(cameras(&read), cameras(&views), "{name}");
     }
 }

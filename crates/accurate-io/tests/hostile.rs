@@ -9,10 +9,11 @@ use std::path::Path;
 
 use accurate_geom::{LengthUnit, Point3, View1};
 use accurate_io::{
-    Column, CurveTable, IoError, PlyEncoding, read_manifest, read_matrix3, read_points,
-    write_curve, write_matrix3, write_pair, write_points, write_rig, write_u8, write_u16,
+    CameraFormat, Column, CurveTable, IoError, PlyEncoding, ViewDefaults, read_cameras,
+    read_manifest, read_matrix3, read_points, write_cameras, write_curve, write_matrix3,
+    write_pair, write_points, write_rig, write_u8, write_u16,
 };
-use common::files::{Read, crc, curve, image, matrix, meta, points, rig, survives};
+use common::files::{Read, cameras, crc, curve, image, matrix, meta, points, rig, survives};
 use common::{Stream, contents};
 
 const MUTATIONS: u64 = 1500;
@@ -119,6 +120,18 @@ fn seeds(dir: &Path) -> Vec<(&'static str, Read)> {
     write_points(&dir.join("points.csv"), &pair.points.unwrap().0).unwrap();
     write_rig(&dir.join("rig.toml"), &pair.rig).unwrap();
     write_rig(&dir.join("rig.json"), &pair.rig).unwrap();
+    let views = read_cameras(&[dir.join("rig.toml")], &ViewDefaults::default()).unwrap();
+    for (name, format) in [
+        ("stereo.yml", CameraFormat::OpencvYaml),
+        ("stereo.xml", CameraFormat::OpencvXml),
+        ("views.json", CameraFormat::ViewsJson),
+        ("p.txt", CameraFormat::MatrixText),
+    ] {
+        write_cameras(&dir.join(name), &views, format).unwrap();
+    }
+    fs::write(dir.join("cameras.txt"), "1 OPENCV 640 480 900 910 320 240 0.1 0.2 0 0\n").unwrap();
+    let images = "# images\n1 1 0 0 0 0.5 2 3 1 a.png\n1.5 2 -1\n2 0 1 0 0 4 5 6 1 b.png\n";
+    fs::write(dir.join("images.txt"), images).unwrap();
     let truth: Vec<Point3> = pair.truth.unwrap();
     let column = |name: &str, unit: &str, scale: f64| Column {
         name: name.into(),
@@ -157,6 +170,12 @@ fn seeds(dir: &Path) -> Vec<(&'static str, Read)> {
         ("points.csv", points),
         ("rig.toml", rig),
         ("rig.json", rig),
+        ("stereo.yml", cameras),
+        ("stereo.xml", cameras),
+        ("views.json", cameras),
+        ("p.txt", cameras),
+        ("cameras.txt", cameras),
+        ("images.txt", cameras),
         ("curve.csv", curve),
         ("ascii.ply", curve),
         ("binary.ply", curve),

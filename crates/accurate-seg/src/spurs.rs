@@ -7,8 +7,9 @@ use crate::{Mask, SegError, Skeleton, distance_to_background};
 /// A side branch is a run of skeleton pixels from an endpoint to a junction; how far it sticks out is
 /// its length less the radius of the strand at the junction. What is cut are the pixels of the mask
 /// that are nearer (in steps through the mask) to the branch than to the rest of the skeleton, beyond
-/// the strand's radius. A strand that ends in two short branches keeps the longer one. Pieces without
-/// a junction stay as they are.
+/// the strand's radius. A strand that ends in two short branches keeps the longer one, unless their
+/// junction is so wide that each leaves its own pixel of it (an upright T): then both go. Pieces without a
+/// junction stay as they are.
 ///
 /// # Errors
 /// [`SegError::TooLarge`] as in [`distance_to_background`].

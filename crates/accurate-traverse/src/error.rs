@@ -136,15 +136,18 @@ pub enum TraverseError {
         /// Pixels of the skeleton.
         pixels: usize,
     },
-    /// A list does not have one entry per point.
-    #[error("{what}: {found} entries for {expected} points")]
-    LengthMismatch {
-        /// Which list.
-        what: &'static str,
-        /// Number of points.
-        expected: usize,
-        /// Entries found.
-        found: usize,
+    /// Far more strands than one body has.
+    #[error(
+        "view {view}: {strands} strands between tips and junctions, {limit} at most: no mask of one body \
+         (specks of a threshold? texture?)"
+    )]
+    Tangled {
+        /// 1 or 2.
+        view: u8,
+        /// Edges of the skeleton's graph.
+        strands: usize,
+        /// The most that are looked at.
+        limit: usize,
     },
     /// Points that make no curve.
     #[error(transparent)]

@@ -25,9 +25,8 @@
 //! junctions of a skeleton nodes and the stretches between them smooth edges, with links over gaps;
 //! [`k_best_walks`] proposes the cheapest [`Walk`]s along the whole body in one go, each with its
 //! price and the reason of every turn. Which proposal is true is for the two views together to say.
-//! [`k_best_walks_with_reward`] and [`fold_variants`] propose again where a proposal left something
-//! unexplained. [`smooth_centreline`], [`recentre`] and [`extend_to_body_ends`] make sub-pixel curves
-//! of pixels.
+//! [`k_best_walks_with_reward`] proposes again where a proposal left something unexplained.
+//! [`smooth_centreline`], [`recentre`] and [`extend_to_body_ends`] make sub-pixel curves of pixels.
 //!
 //! # Source
 //! ACCURATE, section 2.2 (Geometry-consistent Curve Topology Traversal); the rest is ours.
@@ -53,6 +52,6 @@ pub use skeleton::endpoints;
 pub use subpixel::{CentrelineParams, extend_to_body_ends, recentre, smooth_centreline};
 pub use trace::{Jump, Trace};
 pub use walk::{
-    Decision, Fold, FoldParams, HalfEdge, PointFlags, Walk, WalkCost, WalkEnd, WalkParams,
-    fold_variants, k_best_walks, k_best_walks_with_reward,
+    Decision, HalfEdge, PointFlags, Walk, WalkCost, WalkEnd, WalkParams, k_best_walks,
+    k_best_walks_with_reward,
 };

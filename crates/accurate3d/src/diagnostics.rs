@@ -59,7 +59,8 @@ pub struct PointsDiagnostics {
     /// Root mean square distance of the points from the curve, px, before and after.
     pub rms_px: [f64; 2],
     /// Mean of the squared distances in units of the noise's variance: about 1 if the curve explains
-    /// the points (by construction, where the noise was estimated).
+    /// the points. Where the noise was estimated it says nothing: less than 1 by what the curve takes up,
+    /// and far less where the noise stands at its least.
     pub chi2_per_point: f64,
     /// Points of each view that lie beyond what the other one sees.
     pub beyond: [usize; 2],
@@ -128,7 +129,8 @@ pub struct OutlineDiagnostics {
     pub outside: f64,
     /// Mean squared residual of the boundary points, px²; 1/18 at the truth.
     pub chi_per_point: f64,
-    /// By how much the best curve from another pair of walks is worse; none if there is no other.
+    /// By how much the likeliest other curve (somewhere more than 5 px away) is less likely, as
+    /// [`Evidence::margin`]; none if there is no other.
     pub margin: Option<f64>,
     /// Pairs of walks that were fitted.
     pub fits: usize,
@@ -204,7 +206,9 @@ impl Diagnostics {
         let fraction = |range: &Range<usize>, count: usize| range.len() as f64 / count as f64;
         Self {
             mean_epipolar_distance_px: matched.mean_epipolar_distance_px,
-            max_epipolar_distance_px: None,
+            max_epipolar_distance_px: refusal.as_ref().and_then(|_| {
+                matched.points.iter().map(|p| p.epipolar_distance_px).max_by(f64::total_cmp)
+            }),
             trace_coverage: [1.0; 2],
             trace_jumps: [0; 2],
             matched_fraction: [

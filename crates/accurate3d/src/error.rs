@@ -53,6 +53,23 @@ pub enum Error {
         /// Case id.
         case: String,
     },
+    /// What belongs to a view has not the size of its camera's image.
+    #[error(
+        "case {case}, view {view}: the {what} has {} x {} px, its camera sees {} x {}",
+        found.1, found.0, expected.1, expected.0
+    )]
+    OtherSize {
+        /// Case id.
+        case: String,
+        /// 1 or 2.
+        view: u8,
+        /// Mask, image or probability map.
+        what: &'static str,
+        /// (height, width), px.
+        found: (usize, usize),
+        /// (height, width) of the camera, px.
+        expected: (usize, usize),
+    },
     /// The mask of a view could not be skeletonised.
     #[error("case {case}, view {view}: {source}")]
     Segmentation {
@@ -140,6 +157,7 @@ impl Error {
             Self::Fitting { .. } => Some(Stage::Fitting),
             Self::NoCandidate { .. } => Some(Stage::Matching),
             Self::MissingInput { .. }
+            | Self::OtherSize { .. }
             | Self::Name(_)
             | Self::Scoring(_)
             | Self::Synthesis(_)

@@ -85,7 +85,19 @@ impl Params {
 }
 
 impl Params {
-    /// The parameters that take effect, stage by stage, as text for a report.
+    /// What the joint choice goes by: on what a network found, not everything that masks allow.
+    fn in_effect(&self) -> RobustParams {
+        let drawn = self.input != InputKind::Image;
+        RobustParams {
+            exchange: self.robust.exchange && drawn,
+            turned: self.robust.turned && drawn,
+            ..self.robust
+        }
+    }
+
+    /// The parameters that take effect, stage by stage, as text for a report. Where ordered points are
+    /// whole pixels, tangency is looked for over longer stretches
+    /// ([`TangencyParams::WHOLE_PIXELS`](accurate_match::TangencyParams::WHOLE_PIXELS)).
     pub fn described(&self) -> Vec<(&'static str, String)> {
         match (self.method, self.input) {
             (Method::Accurate, InputKind::Points) => vec![
@@ -102,7 +114,10 @@ impl Params {
                 ),
                 ("closed", self.closure.to_string()),
             ],
-            (Method::Accurate, _) => vec![("joint choice", format!("{:?}", self.robust))],
+            (Method::Accurate, _) => vec![
+                ("joint choice", format!("{:?}", self.in_effect())),
+                ("closed", self.closure.to_string()),
+            ],
             (method, InputKind::Points) => vec![("matching", method.matching_described())],
             (method, _) => vec![
                 ("traversal", format!("{:?}", self.traverse)),
@@ -115,8 +130,10 @@ impl Params {
 /// Reconstructs the 3D curve seen in both views of a pair.
 ///
 /// Images must have been segmented by [`segment_images`](crate::segment_images); from there on they
-/// take the way of masks. Masks are skeletonised (Zhang-Suen), ordered by GCTT, and matched. Points are matched in their
-/// order; if view 2 runs against view 1 it is turned round first, and the diagnostics say so.
+/// take the way of masks. By [`Method::Accurate`] one curve is fitted to the outlines of both masks, the
+/// likeliest of all that the walks through them propose; of the other methods masks are skeletonised
+/// (Zhang-Suen), ordered by GCTT, and matched. Points are matched in their order; if view 2 runs against
+/// view 1 it is turned round first, and the diagnostics say so.
 ///
 /// # Errors
 /// [`Error`], which names the case and the stage; never an empty curve, never a NaN.
@@ -124,6 +141,7 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
     if params.input == InputKind::Image {
         require_segmented(pair)?;
     }
+    require_one_size(pair)?;
     match (params.method, params.input) {
         (Method::Accurate, InputKind::Mask | InputKind::Image) => {
             return joint_choice(pair, params);
@@ -180,6 +198,27 @@ fn require_segmented(pair: &ViewPair) -> Result<(), Error> {
     }
 }
 
+/// What belongs to a view has the size of its camera's image.
+fn require_one_size(pair: &ViewPair) -> Result<(), Error> {
+    let cameras = [pair.rig.camera1(), pair.rig.camera2()];
+    for (view, camera) in cameras.into_iter().enumerate() {
+        let size = camera.size();
+        let expected = (size.height as usize, size.width as usize);
+        let found = [
+            ("mask", pair.masks.as_ref().map(|both| both[view].dim())),
+            ("image", pair.images.as_ref().map(|both| both[view].dim())),
+            ("probability map", pair.probabilities.as_ref().map(|both| both[view].dim())),
+        ];
+        for (what, found) in found {
+            if let Some(found) = found.filter(|found| *found != expected) {
+                let (case, view) = (pair.id.clone(), view as u8 + 1);
+                return Err(Error::OtherSize { case, view, what, found, expected });
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Our own method on masks, and on the maps that they were made of.
 fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
     let masks = pair
@@ -198,11 +237,8 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         None => (masks, [0, 0]),
     };
     let drawn = maps.is_none();
-    let robust = RobustParams {
-        exchange: params.robust.exchange && drawn,
-        turned: params.robust.turned && drawn,
-        ..params.robust
-    };
+    let robust = params.in_effect();
+    robust.validate().map_err(|source| Error::Fitting { case: pair.id.clone(), source })?;
     let maps = maps.filter(|_| params.robust.by_probability);
     let images = pair
         .images

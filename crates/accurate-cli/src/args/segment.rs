@@ -110,6 +110,22 @@ pub struct ImportArgs {
     pub foreground: Vec<String>,
     /// Axes that training mirrored along, 0 rows and 1 columns; empty for none. The plans do not
     /// say; nnU-Net's own trainer takes both.
-    #[arg(long, value_delimiter = ',', default_value = "0,1", value_name = "AXES")]
-    pub mirror_axes: Vec<u8>,
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "0,1",
+        value_name = "AXES",
+        value_parser = parse_axis
+    )]
+    pub mirror_axes: Vec<Option<u8>>,
+}
+
+/// One of a list of axes. The empty list is one empty word.
+fn parse_axis(word: &str) -> Result<Option<u8>, String> {
+    match word.trim() {
+        "" => Ok(None),
+        "0" => Ok(Some(0)),
+        "1" => Ok(Some(1)),
+        _ => Err("expected 0 (rows), 1 (columns), both (0,1) or nothing".to_owned()),
+    }
 }

@@ -4,6 +4,7 @@ use super::doctor;
 use crate::args::{CameraArgs, CameraCommand, CameraTarget, ConvertArgs};
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::text::{make_folder, make_place};
 use crate::two_views::cameras_of;
 
 /// `accurate camera`: what camera files say, in one convention, and in another tool's.
@@ -62,7 +63,6 @@ fn described(view: &NamedView) -> String {
 }
 
 fn convert(args: &ConvertArgs, console: &Console) -> Result<(), Failure> {
-    let views = views(&args.cameras)?;
     let format = match args.to {
         CameraTarget::OpencvYaml => CameraFormat::OpencvYaml,
         CameraTarget::OpencvXml => CameraFormat::OpencvXml,
@@ -82,7 +82,13 @@ fn convert(args: &ConvertArgs, console: &Console) -> Result<(), Failure> {
         let message = format!("{}: a rig of this kind ends in .{extension}", args.out.display());
         return Err(Failure::new(Failure::USAGE, message));
     }
-    write_cameras(&args.out, &views, format)?;
+    if format == CameraFormat::Colmap {
+        make_folder(&args.out)?;
+    } else {
+        make_place(&args.out)?;
+    }
+    let views = views(&args.cameras)?;
+    write_cameras(&args.out, &views, format).map_err(Failure::of_output)?;
     for view in &views {
         for note in &view.notes {
             console.remark(&format!("{}: {note}", view.name));

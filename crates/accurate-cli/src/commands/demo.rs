@@ -34,7 +34,7 @@ pub fn run(args: &DemoArgs, console: &Console) -> Result<(), Failure> {
     let outputs = Outputs {
         folder: Some(args.out.clone()),
         extras: vec![Extra::Ply, Extra::Vtp, Extra::MrkJson, Extra::Picture, Extra::Report],
-        files: Vec::new(),
+        ..Outputs::default()
     };
     outputs.write(&pair, &reconstruction, &result)?;
     if console.json {

@@ -15,10 +15,19 @@ use serde_json::{Value, json};
 use crate::args::DoctorArgs;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::text::make_place;
 use crate::two_views::two_cameras;
 
 /// `accurate camera doctor`: what is wrong with two cameras, by what was seen with them.
 pub fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
+    if let Some(path) = &args.out {
+        let extension = path.extension().map(|e| e.to_ascii_lowercase());
+        if !extension.is_some_and(|e| e == "toml" || e == "json") {
+            let message = format!("a rig is written as .toml or .json, not as {}", path.display());
+            return Err(Failure::new(Failure::USAGE, message));
+        }
+        make_place(path)?;
+    }
     let (views, seen) = examined(args)?;
     let unit = common_unit(&views)?;
     let cameras = [views[0].camera.clone(), views[1].camera.clone()];
@@ -34,7 +43,7 @@ pub fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
         let [one, two] = &diagnosis.mended;
         let rig = Rig::new(one.clone(), two.clone(), unit)
             .map_err(|e| Failure::new(Failure::BAD_INPUT, format!("the mended rig: {e}")))?;
-        write_rig(path, &rig)?;
+        write_rig(path, &rig).map_err(Failure::of_output)?;
     }
     if console.json {
         console.json(&as_json(&views, &diagnosis))?;

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use accurate3d::eval::{self, curve_scores, reprojection_rms};
-use accurate3d::geom::{Point2, Point3, Polyline3, View1};
+use accurate3d::geom::{LengthUnit, Point2, Point3, Polyline3, View1};
 use accurate3d::io::{
     PairParts, Truth, ViewDefaults, read_curve, read_mask, read_pair, read_points,
 };
@@ -12,13 +12,14 @@ use crate::args::EvalArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::two_views::cameras_of;
+use crate::units::common_unit;
 
 /// `accurate eval`: the paper's scores and the point-to-polyline ones, as JSON.
 pub fn run(args: &EvalArgs, console: &Console) -> Result<(), Failure> {
     let curve = read_curve(&args.curve)?;
     let truth = read_curve(&args.truth)?;
+    let mut unit = common_unit(("the curve", curve.unit), ("the truth", truth.unit))?;
     let mut scores = table_scores(&curve.points, &truth.points)?;
-    scores["unit"] = json!(curve.unit.label());
     // A curve in disorder may be many times as long as the truth: its scores are poor, not missing.
     let [length, truth_length] = [&curve, &truth].map(|c| polyline_length(&c.points));
     let spacing = args.spacing.unwrap_or_else(|| (truth_length / 4000.0).max(length / 40_000.0));
@@ -36,18 +37,21 @@ pub fn run(args: &EvalArgs, console: &Console) -> Result<(), Failure> {
     if let Some(dir) = &args.pair {
         let parts = PairParts { points: false, masks: false, images: false, truth: Truth::Ignore };
         let pair = read_pair(dir, parts)?;
+        unit = common_unit(("the curve", unit), ("the pair", pair.rig.unit()))?;
         let rms = reprojection_rms(&curve.points, &truth.points, &pair.rig, spacing)?;
         scores["reprojection_rms_px"] = json!([rms.view1_px, rms.view2_px]);
     }
     if let (Some(camera), Some(seen)) = (&args.third, &args.seen) {
-        scores["third_view"] = third_view(&curve.points, camera, seen, spacing)?;
+        scores["third_view"] = third_view(&curve.points, unit, camera, seen, spacing)?;
     }
+    scores["unit"] = json!(unit.label());
     console.json(&scores)
 }
 
 /// How far the image of a curve lies from what a view shows that took no part, px.
 fn third_view(
     curve: &[Point3],
+    unit: LengthUnit,
     camera: &Path,
     seen: &Path,
     spacing: f64,
@@ -57,6 +61,7 @@ fn third_view(
         let message = format!("{}: {} views; expected one", camera.display(), views.len());
         return Err(Failure::new(Failure::USAGE, message));
     };
+    common_unit(("the curve", unit), ("the third view", view.unit))?;
     let is_csv = seen.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
     let shown: Vec<Point2> = if is_csv {
         let points = read_points::<View1>(seen)?;

@@ -20,7 +20,6 @@ mod xray;
 use crate::args::{Cli, Command};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::write_text;
 
 /// Runs the command of a parsed command line. `config` is the config file that gives the same run.
 pub fn run(cli: &Cli, config: &str) -> Result<(), Failure> {
@@ -30,14 +29,7 @@ pub fn run(cli: &Cli, config: &str) -> Result<(), Failure> {
         .map_err(|error| Failure::new(Failure::INTERNAL, error.to_string()))?;
     let console = Console::of(cli);
     match &cli.command {
-        Command::Reconstruct(args) => {
-            let result = reconstruct::run(args, &console);
-            // No folder, no result: then there is nothing to repeat.
-            if let Some(folder) = args.out.iter().find(|path| path.is_dir()) {
-                write_text(&folder.join("config.toml"), config)?;
-            }
-            result
-        }
+        Command::Reconstruct(args) => reconstruct::run(args, config, &console),
         Command::Synth(args) => synth::run(args, &console),
         Command::Eval(args) => eval::run(args, &console),
         Command::Table(args) => table::run(args, &console),

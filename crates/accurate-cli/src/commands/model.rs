@@ -12,6 +12,7 @@ use crate::args::{ImportArgs, ModelCommand};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::segmentation::{bundle, library};
+use crate::text::make_place;
 
 /// Largest plans.json, dataset.json or description, bytes.
 const MAX_JSON_BYTES: u64 = 1 << 24;
@@ -28,6 +29,7 @@ pub fn run(command: &ModelCommand, console: &Console) -> Result<(), Failure> {
         }
         ModelCommand::Import(args) => import(args, console),
         ModelCommand::Pack { network, manifest, out } => {
+            make_place(out)?;
             let manifest = Manifest::from_json(&read_file(manifest, MAX_JSON_BYTES)?)
                 .map_err(|error| Failure::from(error).of_file(manifest))?;
             let bytes = read_file(network, MAX_NETWORK_BYTES)?;
@@ -139,6 +141,7 @@ fn verify(
 }
 
 fn import(args: &ImportArgs, console: &Console) -> Result<(), Failure> {
+    make_place(&args.out)?;
     let network = match &args.network {
         Some(network) => network.clone(),
         None => only_network(&args.folder)?,
@@ -155,7 +158,7 @@ fn import(args: &ImportArgs, console: &Console) -> Result<(), Failure> {
         network: read_file(&network, MAX_NETWORK_BYTES)?.into(),
         configuration: &args.configuration,
         foreground: &foreground,
-        mirror_axes: args.mirror_axes.clone(),
+        mirror_axes: args.mirror_axes.iter().copied().flatten().collect(),
     }
     .to_bundle()
     .map_err(|error| Failure::from(error).of_file(&args.folder))?;
@@ -186,7 +189,7 @@ fn only_network(folder: &Path) -> Result<PathBuf, Failure> {
 
 fn write(bundle: &ModelBundle, out: &Path, console: &Console) -> Result<(), Failure> {
     let bytes = bundle.to_bytes()?;
-    write_atomically(out, |file| file.write_all(&bytes))?;
+    write_atomically(out, |file| file.write_all(&bytes)).map_err(Failure::of_output)?;
     if console.json {
         return console.json(&described(bundle));
     }

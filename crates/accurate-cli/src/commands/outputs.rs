@@ -2,12 +2,13 @@ use std::path::{Path, PathBuf};
 
 use accurate3d::io::{is_curve_file, remove_unfinished, write_curve, write_json};
 use accurate3d::{Provenance, Reconstruction, ViewPair, picture_svg, report_html};
+use clap::ValueEnum;
 use serde_json::Value;
 
 use crate::args::{Extra, ReconstructArgs};
 use crate::failure::Failure;
 use crate::raster::write_picture;
-use crate::text::{make_folder, write_text};
+use crate::text::{check_folder, check_output, make_folder, remove_file, write_text};
 
 /// Where the results of a command go: at most one folder, and single files.
 #[derive(Debug, Clone, Default)]
@@ -15,7 +16,15 @@ pub struct Outputs {
     pub folder: Option<PathBuf>,
     pub extras: Vec<Extra>,
     pub files: Vec<PathBuf>,
+    /// The config file that gives the same run, for the folder.
+    pub config: Option<String>,
 }
+
+const CURVE: &str = "curve.csv";
+const RESULT: &str = "result.json";
+const CONFIG: &str = "config.toml";
+/// What a file of results may end with.
+const KNOWN: &str = ".csv, .ply, .vtp, .mrk.json, .npy, .npz, .parquet, .svg, .png, .html or .json";
 
 /// What a file is to hold.
 enum Kind {
@@ -27,22 +36,26 @@ enum Kind {
 
 impl Outputs {
     /// # Errors
-    /// Two folders, or two results of the same name.
-    pub fn of(args: &ReconstructArgs) -> Result<Self, Failure> {
-        let mut outputs = Self { extras: args.also.clone(), ..Self::default() };
+    /// Two folders, or a file whose extension says nothing.
+    pub fn of(args: &ReconstructArgs, config: &str) -> Result<Self, Failure> {
+        let config = Some(config.to_owned());
+        let mut outputs = Self { extras: args.also.clone(), config, ..Self::default() };
         for path in &args.out {
             if kind_of(path).is_some() {
                 outputs.files.push(path.clone());
+            } else if !is_folder_name(path) {
+                let message = format!("{}: unknown extension", path.display());
+                return Err(Failure::new(Failure::USAGE, message).with_hint(format!(
+                    "known are {KNOWN}; for a folder of this name end it with /"
+                )));
             } else if let Some(other) = &outputs.folder {
                 let message = format!(
                     "{} and {} are both taken for folders",
                     other.display(),
                     path.display()
                 );
-                return Err(Failure::new(Failure::USAGE, message).with_hint(
-                    "one folder, and files ending in .csv, .ply, .vtp, .mrk.json, .npy, .npz, \
-                     .parquet, .svg, .png, .html or .json",
-                ));
+                return Err(Failure::new(Failure::USAGE, message)
+                    .with_hint(format!("one folder, and files ending in {KNOWN}")));
             } else {
                 outputs.folder = Some(path.clone());
             }
@@ -76,7 +89,27 @@ impl Outputs {
             || self.files.iter().any(|f| matches!(kind_of(f), Some(Kind::Report)))
     }
 
-    /// Writes everything; what depends on everything else, `result.json`, last.
+    /// Refuses, before the work, places that cannot be written to, and those of files that are read.
+    pub fn check(&self, read: &[&PathBuf]) -> Result<(), Failure> {
+        let mut written = self.files.clone();
+        if let Some(folder) = &self.folder {
+            check_folder(folder)?;
+            written.extend(own_names().map(|name| folder.join(name)));
+        }
+        let read: Vec<PathBuf> = read.iter().filter_map(|path| path.canonicalize().ok()).collect();
+        for file in &written {
+            check_output(file)?;
+            if file.canonicalize().is_ok_and(|file| read.contains(&file)) {
+                let message = format!("{} is read, and would be replaced", file.display());
+                return Err(Failure::new(Failure::USAGE, message)
+                    .with_hint("give another place for the results"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes everything. A folder that holds `result.json` is whole and of one run: an old one goes
+    /// first, then what an earlier run wrote and this one does not; the new one comes last.
     pub fn write(
         &self,
         pair: &ViewPair,
@@ -87,7 +120,11 @@ impl Outputs {
             make_folder(folder)?;
             // What a run that was killed while writing left here.
             remove_unfinished(folder)?;
-            write_one(&folder.join("curve.csv"), pair, reconstruction, result)?;
+            remove_earlier(folder)?;
+            if let Some(config) = &self.config {
+                write_text(&folder.join(CONFIG), config)?;
+            }
+            write_one(&folder.join(CURVE), pair, reconstruction, result)?;
             for extra in &self.extras {
                 write_one(&folder.join(extra.file_name()), pair, reconstruction, result)?;
             }
@@ -99,10 +136,34 @@ impl Outputs {
             write_one(file, pair, reconstruction, result)?;
         }
         if let Some(folder) = &self.folder {
-            write_json(&folder.join("result.json"), result)?;
+            write_json(&folder.join(RESULT), result).map_err(Failure::of_output)?;
         }
         Ok(())
     }
+}
+
+/// Removes an earlier run's files from a folder, by the names that this program gives.
+///
+/// Only where its result or its config stands: in a folder of the user's own, a `curve.ply` is the
+/// user's own. The config goes last, so that a removal which was stopped is gone on with.
+fn remove_earlier(folder: &Path) -> Result<(), Failure> {
+    if ![RESULT, CONFIG].iter().any(|name| folder.join(name).is_file()) {
+        return Ok(());
+    }
+    own_names().try_for_each(|name| remove_file(&folder.join(name)))
+}
+
+/// Every name that this program gives in a folder of results: the result first, the config last.
+fn own_names() -> impl Iterator<Item = &'static str> {
+    let extras = Extra::value_variants().iter().map(|extra| extra.file_name());
+    [RESULT].into_iter().chain(extras).chain([CURVE, CONFIG])
+}
+
+/// Whether a name that is no file of results may be a folder's.
+fn is_folder_name(path: &Path) -> bool {
+    path.extension().is_none()
+        || path.is_dir()
+        || path.as_os_str().as_encoded_bytes().ends_with(b"/")
 }
 
 fn kind_of(path: &Path) -> Option<Kind> {
@@ -130,9 +191,11 @@ fn write_one(
             let html = report_html(pair, reconstruction, scores, &provenance(result))?;
             write_text(path, &html)
         }
-        Some(Kind::Result) => Ok(write_json(path, result)?),
+        Some(Kind::Result) => write_json(path, result).map_err(Failure::of_output),
         // Whatever else there is a name for is a curve; the writer refuses the rest.
-        Some(Kind::Curve) | None => Ok(write_curve(path, &reconstruction.curve_table())?),
+        Some(Kind::Curve) | None => {
+            write_curve(path, &reconstruction.curve_table()).map_err(Failure::of_output)
+        }
     }
 }
 

@@ -10,8 +10,9 @@ use crate::args::PlanArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::raster::{is_picture, write_picture};
-use crate::text::write_text;
-use crate::two_views::cameras_of;
+use crate::text::{make_place, write_text};
+use crate::two_views::{cameras_of, named};
+use crate::units::common_unit;
 
 /// Views that are printed.
 const SHOWN: usize = 5;
@@ -26,10 +27,11 @@ pub fn run(args: &PlanArgs, console: &Console) -> Result<(), Failure> {
                 format!("a plan is written as .svg, .png or .csv, not {}", path.display());
             return Err(Failure::new(Failure::USAGE, message));
         }
+        make_place(path)?;
     }
     let view = first_view(args)?;
     let shape = read_curve(&args.shape)?;
-    let unit = common_unit(shape.unit, view.unit)?;
+    let unit = common_unit(("the shape", shape.unit), ("the first view", view.unit))?;
     let params = PlanParams {
         sigma_px: args.sigma_px,
         primary_deg: args.primary.0,
@@ -70,32 +72,16 @@ pub fn run(args: &PlanArgs, console: &Console) -> Result<(), Failure> {
 
 fn first_view(args: &PlanArgs) -> Result<NamedView, Failure> {
     let mut views = cameras_of(std::slice::from_ref(&args.first), &args.stated.defaults())?;
+    if let Some(name) = &args.view {
+        return named(&views, name).map_err(|failure| failure.of_file(&args.first));
+    }
     let names = views.iter().map(|v| v.name.clone()).collect::<Vec<_>>().join(", ");
-    let index = match &args.view {
-        Some(name) => views.iter().position(|view| &view.name == name),
-        None if views.len() == 1 => Some(0),
-        None => None,
-    };
-    index.map(|index| views.swap_remove(index)).ok_or_else(|| {
-        let message = match &args.view {
-            Some(name) => format!("{}: no view `{name}`", args.first.display()),
-            None => format!("{}: more than one view", args.first.display()),
-        };
+    let first = views.pop().filter(|_| views.is_empty());
+    first.ok_or_else(|| {
+        let message = format!("{}: more than one view", args.first.display());
         Failure::new(Failure::USAGE, message)
             .with_hint(format!("name one of them with --view: {names}"))
     })
-}
-
-/// The unit of both; a file without one takes the other's.
-fn common_unit(shape: LengthUnit, camera: LengthUnit) -> Result<LengthUnit, Failure> {
-    match (shape, camera) {
-        (a, b) if a == b => Ok(a),
-        (LengthUnit::Unit, other) | (other, LengthUnit::Unit) => Ok(other),
-        (a, b) => {
-            let message = format!("the shape is in {a}, the first view in {b}");
-            Err(Failure::new(Failure::BAD_INPUT, message).with_hint("convert one of them"))
-        }
-    }
 }
 
 fn is_csv(path: &Path) -> bool {

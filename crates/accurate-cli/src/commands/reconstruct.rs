@@ -6,7 +6,8 @@ use accurate3d::io::{PairParts, Truth, find_pairs, hash_file, hash_pair, read_pa
 use accurate3d::seg::network::NetworkSegmenter;
 use accurate3d::seg::{Segmenter, unwatched};
 use accurate3d::{
-    InputKind, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair, reconstruct, segment_images,
+    Closure, InputKind, Method, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair,
+    reconstruct, segment_images,
 };
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -27,8 +28,16 @@ enum Source {
 }
 
 /// `accurate reconstruct`: every pair on its own; one that fails does not stop the others.
-pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
-    let jobs = jobs(args)?;
+///
+/// `config` is the config file that gives the same run; every result's folder gets it.
+pub fn run(args: &ReconstructArgs, config: &str, console: &Console) -> Result<(), Failure> {
+    refuse_what_takes_no_effect(args)?;
+    let jobs = jobs(args, config)?;
+    let read: Vec<&PathBuf> =
+        args.inputs.iter().chain(&args.views.cameras).chain(&args.truth).collect();
+    for (_, outputs) in &jobs {
+        outputs.check(&read)?;
+    }
     let segmenter = match args.input {
         InputKind::Image => Some(segmenter(&args.model, console)?),
         InputKind::Points | InputKind::Mask => None,
@@ -46,7 +55,7 @@ pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
     let total = results.len();
     let mut first_failure = None;
     let (mut failed, mut suspect) = (0, Vec::new());
-    for result in results {
+    for (result, (source, _)) in results.into_iter().zip(&jobs) {
         match result {
             Ok(done) => {
                 if console.json {
@@ -58,8 +67,8 @@ pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
             }
             Err(failure) => {
                 failed += 1;
-                if total > 1 {
-                    console.remark(&failure.to_string());
+                if let (Source::Folder(pair), true) = (source, total > 1) {
+                    console.failure_of("pair", &pair.display().to_string(), &failure);
                 }
                 first_failure.get_or_insert(failure);
             }
@@ -78,6 +87,22 @@ pub fn run(args: &ReconstructArgs, console: &Console) -> Result<(), Failure> {
     }
 }
 
+/// Options that the method would pass over without a word.
+fn refuse_what_takes_no_effect(args: &ReconstructArgs) -> Result<(), Failure> {
+    let options = [
+        (args.refine_calibration, "--refine-calibration"),
+        (args.closed == Closure::Closed, "--closed yes"),
+    ];
+    match options.into_iter().find(|(given, _)| *given) {
+        Some((_, option)) if args.method != Method::Accurate => {
+            let message = format!("the method `{}` knows no {option}", args.method);
+            Err(Failure::new(Failure::USAGE, message)
+                .with_hint("take --method accurate, or leave the option out"))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// A written result.
 struct Done {
     /// One line for a reader.
@@ -89,8 +114,8 @@ struct Done {
 }
 
 /// What is read, with the places each result goes to.
-fn jobs(args: &ReconstructArgs) -> Result<Vec<(Source, Outputs)>, Failure> {
-    let outputs = Outputs::of(args)?;
+fn jobs(args: &ReconstructArgs, config: &str) -> Result<Vec<(Source, Outputs)>, Failure> {
+    let outputs = Outputs::of(args, config)?;
     if are_files(args) {
         return Ok(vec![(Source::Files, outputs)]);
     }
@@ -152,6 +177,19 @@ struct Read {
     inputs: Vec<Value>,
 }
 
+/// Refuses points that are no curve yet.
+fn check_points(pair: &ViewPair) -> Result<(), Failure> {
+    let counts = pair.points.as_ref().map(|(one, two)| [one.len(), two.len()]);
+    for (view, count) in (1..).zip(counts.into_iter().flatten()) {
+        if count < 2 {
+            let message = format!("{}: {count} point in view {view}", pair.id);
+            return Err(Failure::new(Failure::BAD_INPUT, message)
+                .with_hint("a curve takes two points at least, in order along the body"));
+        }
+    }
+    Ok(())
+}
+
 fn read(source: &Source, args: &ReconstructArgs, has_report: bool) -> Result<Read, Failure> {
     let dir = match source {
         Source::Folder(dir) => dir,
@@ -198,6 +236,7 @@ fn one(
     segmenter: Option<&NetworkSegmenter>,
 ) -> Result<Done, Failure> {
     let Read { pair, shown, inputs } = read(source, args, out.has_report())?;
+    check_points(&pair)?;
     let pair = match segmenter {
         Some(segmenter) => segment_images(pair, segmenter, &unwatched)?,
         None => pair,

@@ -50,8 +50,8 @@ pub struct Manifest {
 pub fn run(args: &ReproduceArgs, console: &Console) -> Result<(), Failure> {
     let Experiment::Table1 = args.experiment;
     let size = Size { seeds: &args.seeds, cases: args.cases, image_cases: args.image_cases };
-    let (manifest, files) = table1(size, &args.model, console)?;
     make_folder(&args.out)?;
+    let (manifest, files) = table1(size, &args.model, console)?;
     for (name, text) in &files {
         write_text(&args.out.join(name), text)?;
     }

@@ -42,11 +42,10 @@ pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
             Ok(report) => console.data(&line(&report))?,
             Err(failure) => {
                 failed += 1;
-                let failure = failure.of_file(image);
                 if jobs.len() > 1 {
-                    console.remark(&failure.to_string());
+                    console.failure_of("image", &image.display().to_string(), &failure);
                 }
-                first_failure.get_or_insert(failure);
+                first_failure.get_or_insert(failure.of_file(image));
             }
         }
         bar.inc(1);

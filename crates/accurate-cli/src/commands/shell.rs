@@ -1,10 +1,11 @@
 //! What a shell or a packager asks for: completions, the manual, the schema of the config file.
 
-use clap::CommandFactory;
+use clap::{Command, CommandFactory};
 use clap_complete::Shell;
+use clap_mangen::Man;
 
 use crate::args::{Cli, ConfigCommand};
-use crate::config::schema;
+use crate::config::{schema, subcommands};
 use crate::console::Console;
 use crate::failure::Failure;
 
@@ -18,20 +19,24 @@ pub fn completions(shell: Shell, console: &Console) -> Result<(), Failure> {
 /// `accurate man`: the manual pages of the command and of every command below it, one behind the
 /// other, as roff.
 pub fn manual(console: &Console) -> Result<(), Failure> {
-    let mut pages = Vec::new();
-    let mut command = Cli::command();
+    let mut command = without_help(Cli::command());
     command.build();
-    let mut render = |command: clap::Command| {
-        clap_mangen::Man::new(command)
-            .render(&mut pages)
-            .map_err(|error| Failure::new(Failure::IO, error.to_string()))
-    };
-    render(command.clone())?;
-    for below in command.get_subcommands().filter(|below| !below.is_hide_set()) {
-        let name = below.get_bin_name().unwrap_or(below.get_name()).replace(' ', "-");
-        render(below.clone().name(name))?;
-    }
+    let mut pages = Vec::new();
+    render(&command, &mut pages).map_err(|error| Failure::new(Failure::IO, error.to_string()))?;
     console.data(String::from_utf8_lossy(&pages).trim_end())
+}
+
+/// A command without the commands called `help` in it, which have no page.
+fn without_help(command: Command) -> Command {
+    command.disable_help_subcommand(true).mut_subcommands(without_help)
+}
+
+/// A command's page, and those of the commands below it.
+fn render(command: &Command, pages: &mut Vec<u8>) -> std::io::Result<()> {
+    let name = command.get_bin_name().unwrap_or(command.get_name()).replace(' ', "-");
+    // The heading of a page is one line; `--version` has two.
+    Man::new(command.clone().name(name).version(env!("CARGO_PKG_VERSION"))).render(pages)?;
+    subcommands(command).try_for_each(|below| render(below, pages))
 }
 
 /// `accurate config schema`: the JSON schema of the config file.

@@ -5,11 +5,16 @@ use accurate3d::synth::{
     CalibrationError, CaseOptions, Family, SynthCase, XrayOptions, generate, render_xray,
 };
 use rayon::prelude::*;
+use serde_json::Value;
 
 use super::xray;
 use crate::args::{CasesArgs, Disturbances, PointsKind, SynthArgs, SynthCommand};
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::text::{make_folder, read_text, remove_file};
+
+/// What the source of a generated case begins with.
+const SOURCE: &str = "accurate synth";
 
 /// `accurate synth`: pair folders of a family, or single X-ray images.
 pub fn run(args: &SynthArgs, console: &Console) -> Result<(), Failure> {
@@ -28,6 +33,7 @@ fn generate_cases(
     console: &Console,
 ) -> Result<(), Failure> {
     let options = case_options(&args.disturbances);
+    make_folder(out)?;
     let bar = console.progress(args.count as usize, "generating");
     let last = args
         .first
@@ -37,6 +43,7 @@ fn generate_cases(
         let case = generate(family, args.seed, index, &options)?;
         let images = args.xray.then(|| xray_images(&case));
         let dir = out.join(format!("case_{index:03}"));
+        remove_earlier(&dir, images.is_some())?;
         write_pair(&dir, &contents_of(case, args.points, images))?;
         bar.inc(1);
         Ok::<(), Failure>(())
@@ -46,6 +53,33 @@ fn generate_cases(
     Ok(())
 }
 
+/// Removes what an earlier run wrote to a case's folder and this run will not: images belong to the
+/// cameras and the curve that they were drawn with. `meta.json` goes too, as the mark of a whole pair.
+///
+/// # Errors
+/// [`Failure::USAGE`] for a folder that is not of this command.
+fn remove_earlier(dir: &Path, draws_images: bool) -> Result<(), Failure> {
+    let meta = dir.join("meta.json");
+    let described: Option<Value> =
+        read_text(&meta).ok().and_then(|t| serde_json::from_str(&t).ok());
+    let source = described.as_ref().and_then(|value| value["source"].as_str());
+    let is_ours = source.is_some_and(|source| source.starts_with(SOURCE));
+    let mut stale = ["L", "R"].map(|view| dir.join(format!("images/view_{view}.png"))).to_vec();
+    stale.retain(|image| !draws_images && image.is_file());
+    // Without both, it is a run that was stopped, which begins anew.
+    if !is_ours && (meta.is_file() || !stale.is_empty()) {
+        let message = format!("{} is there, and `{SOURCE}` has not made it", dir.display());
+        return Err(Failure::new(Failure::USAGE, message)
+            .with_hint("give another --out, or remove that folder first"));
+    }
+    stale.iter().try_for_each(|image| remove_file(image))?;
+    if !draws_images {
+        // Left where it holds something else.
+        let _ = std::fs::remove_dir(dir.join("images"));
+    }
+    remove_file(&meta)
+}
+
 /// A generated case as the contents of a pair folder.
 pub fn contents_of(
     case: SynthCase,
@@ -53,10 +87,7 @@ pub fn contents_of(
     images: Option<[GreyImage; 2]>,
 ) -> PairContents {
     PairContents {
-        source: Some(format!(
-            "accurate synth {} seed {} case {}",
-            case.family, case.seed, case.index
-        )),
+        source: Some(format!("{SOURCE} {} seed {} case {}", case.family, case.seed, case.index)),
         case_id: case.id,
         rig: case.rig,
         points: Some(match points {

@@ -17,7 +17,7 @@ use crate::code::Code;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::segmentation::segmenter;
-use crate::text::{read_text, write_text};
+use crate::text::{make_place, read_text, write_text};
 
 /// `accurate table`: the paper's table on a set, or the check of its cells.
 pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
@@ -35,6 +35,9 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
             Failure::USAGE,
             "no row of the table has these methods and inputs",
         ));
+    }
+    if let Some(path) = &args.out {
+        make_place(path)?;
     }
     let calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
     let segmenter = match rows.iter().any(|row| row.input == InputKind::Image)

@@ -8,10 +8,13 @@ use accurate3d::traverse::{TraverseParams, trace_single};
 use crate::args::TraceArgs;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::write_text;
+use crate::text::{make_place, write_text};
 
 /// `accurate trace`: a mask's skeleton in order, as `x,y` lines.
 pub fn run(args: &TraceArgs, console: &Console) -> Result<(), Failure> {
+    if let Some(path) = &args.out {
+        make_place(path)?;
+    }
     let mask = Mask::from_array(read_mask(&args.mask)?)?;
     let skeleton = Skeleton::of(&zhang_suen(&mask))?;
     let trace = trace_single(&skeleton.pixels_as::<View1>(), &TraverseParams::PAPER)?;

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::args::{XrayArgs, XrayGenerator};
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::text::make_place;
 
 /// Name of the list of a folder of shards.
 const LIST: &str = "shards.json";
@@ -23,6 +24,7 @@ const LIST: &str = "shards.json";
 const TILE_PX: usize = 256;
 /// Images side by side on a contact sheet; each takes two tiles.
 const PER_ROW: usize = 4;
+const MOST_ON_A_SHEET: u64 = 400;
 
 /// `accurate synth xray`: shards to train on, a sheet to look at.
 pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
@@ -34,6 +36,18 @@ pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
     domain.check()?;
     if args.first.checked_add(args.count).is_none() {
         return Err(Failure::new(Failure::USAGE, "--first plus --count is too large"));
+    }
+    if let Some(path) = &args.sheet {
+        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+            let message = format!("a sheet is written as .png, not as {}", path.display());
+            return Err(Failure::new(Failure::USAGE, message));
+        }
+        if args.count > MOST_ON_A_SHEET {
+            let message =
+                format!("--count {}: a sheet holds at most {MOST_ON_A_SHEET} images", args.count);
+            return Err(Failure::new(Failure::USAGE, message));
+        }
+        make_place(path)?;
     }
     let backgrounds: Vec<_> =
         args.onto.iter().map(|path| middle_of(path, args.size)).collect::<Result<_, _>>()?;
@@ -49,14 +63,10 @@ pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
         write_shards(folder, args, &draw, console)?;
     }
     if let Some(path) = &args.sheet {
-        if args.count > 400 {
-            let message = format!("--count {}: a sheet holds at most 400 images", args.count);
-            return Err(Failure::new(Failure::USAGE, message));
-        }
         let last = args.first + args.count;
         let samples: Vec<_> =
             (args.first..last).into_par_iter().map(draw).collect::<Result<_, _>>()?;
-        write_rgb(path, &sheet(&samples))?;
+        write_rgb(path, &sheet(&samples)).map_err(Failure::of_output)?;
         console.remark(&format!("{} images in {}", args.count, path.display()));
     }
     Ok(())

@@ -3,6 +3,7 @@
 
 mod commands;
 mod dicom;
+mod outputs;
 mod privacy;
 mod program;
 mod refusals;

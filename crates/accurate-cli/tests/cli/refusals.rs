@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::program::{accurate, copy_of, failure, samples};
@@ -162,5 +163,56 @@ fn wrong_usage_has_its_own_exit_code() {
         &["synth", "spaghetti", "--out", "y"],
     ] {
         assert_eq!(failure(accurate().args(args)).0, 2, "{args:?}");
+    }
+}
+
+#[test]
+fn every_failed_pair_is_named_also_quietly_and_to_a_program() {
+    let dir = TempDir::new().unwrap();
+    let bad = copy_of("bend", dir.path());
+    fs::remove_file(bad.join("masks/mask_L.png")).unwrap();
+    let worse = copy_of("loop", dir.path());
+    fs::remove_file(worse.join("calibration/RT_R.txt")).unwrap();
+    let run = |flag: &str| {
+        let mut command = accurate();
+        command.args(["reconstruct", "-i", "mask", "-m", "paper", flag, "-o"]);
+        command.arg(dir.path().join("out")).args([&bad, &worse]).arg(samples().join("wire"));
+        failure(&mut command)
+    };
+    let (code, said) = run("-q");
+    assert_eq!(code, 66, "{said}");
+    for pair in [&bad, &worse] {
+        let line = format!("error[A030]: {}: missing file", pair.display());
+        assert!(said.contains(&line), "no `{line}` in: {said}");
+    }
+    assert!(said.contains("2 of 3 pairs failed"), "{said}");
+    let (_, said) = run("--json");
+    let lines: Vec<Value> = said.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(lines.len(), 3, "{said}");
+    for (line, pair) in lines.iter().zip([&bad, &worse]) {
+        assert_eq!((&line["pair"], &line["code"]), (&pair.to_str().into(), &"A030".into()));
+    }
+    assert_eq!(lines[2]["error"], "2 of 3 pairs failed");
+}
+
+#[test]
+fn options_that_the_method_does_not_know_are_refused() {
+    for option in [&["--closed", "yes"][..], &["--refine-calibration"]] {
+        let mut command = accurate();
+        command.args(["reconstruct", "-i", "points", "-m", "paper", "-o", "never"]).args(option);
+        let (code, said) = failure(command.arg(samples().join("bend")));
+        assert!(code == 2 && said.contains(option[0]), "{option:?}: {code} {said}");
+    }
+}
+
+#[test]
+fn one_point_is_no_curve() {
+    for view in ["L", "R"] {
+        refuses(
+            "points",
+            |p| write(p.join(format!("points/points_{view}.csv")), "x,y\n250,250\n"),
+            65,
+            &["1 point in view", "hint"],
+        );
     }
 }

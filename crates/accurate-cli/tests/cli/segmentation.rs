@@ -252,3 +252,22 @@ fn nnunet_results_become_a_model_that_runs() {
         assert!(message.contains(word), "{message}");
     }
 }
+
+#[test]
+fn an_image_that_fails_is_named_also_quietly_and_to_a_program() {
+    let dir = TempDir::new().unwrap();
+    let model = dark_model(dir.path());
+    let image = pair_of_shadows("bend", dir.path()).join("images/view_L.png");
+    let run = |flag: &str| {
+        let mut command = accurate();
+        command.env_remove("ORT_DYLIB_PATH").args(["segment", "nowhere.png", flag, "--model"]);
+        command.arg(&model).arg(&image).arg("-o").arg(dir.path().join("out"));
+        failure(&mut command)
+    };
+    let (code, said) = run("-q");
+    assert_eq!(code, 66, "{said}");
+    assert!(said.contains("error[A030]: nowhere.png: missing file"), "{said}");
+    let (_, said) = run("--json");
+    let first: Value = serde_json::from_str(said.lines().next().unwrap()).unwrap();
+    assert_eq!((&first["image"], &first["code"]), (&"nowhere.png".into(), &"A030".into()));
+}

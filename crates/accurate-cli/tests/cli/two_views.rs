@@ -53,7 +53,7 @@ fn cameras_of_every_kind_and_two_files_give_the_curve_of_the_pair_folder() {
             assert!(names.contains("_L_") && names.ends_with("_R"), "{names}");
             assert!(result["scores"]["overall"].as_f64().unwrap() < 6.0);
             let inputs = result["inputs"].as_array().unwrap();
-            assert_eq!(inputs.len(), 3, "cameras and both files are named with their hashes");
+            assert_eq!(inputs.len(), 4, "cameras, both files and truth have their hashes");
         }
     }
 }
@@ -239,4 +239,137 @@ fn figures_are_drawn_as_png_too() {
     assert_eq!(one, draw("two.png"));
     let (code, message) = failure(accurate().args(["figure", "overview", "-o", "x.pdf"]));
     assert!(code == 2 && message.contains("x.pdf"), "{message}");
+}
+
+/// `accurate reconstruct` of a sample's points with these cameras.
+fn of_points(cameras: &Path, out: &Path) -> Command {
+    let mut command = accurate();
+    command.args(["reconstruct", "-i", "points", "-m", "paper", "--json", "-o"]).arg(out);
+    command.arg("--cameras").arg(cameras);
+    command.args(["L", "R"].map(|v| sample("bend", &format!("points/points_{v}.csv"))));
+    command
+}
+
+#[test]
+fn every_file_behind_a_result_is_named_with_its_hash() {
+    let dir = TempDir::new().unwrap();
+    let colmap = dir.path().join("colmap");
+    converted("bend", "colmap", &colmap);
+    let truth = sample("bend", "annotations/guidewire_3D.ply");
+    let both = ["colmap/cameras.txt", "colmap/images.txt"];
+    let own = ["K_L.txt", "K_R.txt", "RT_L.txt", "RT_R.txt", "meta.json"];
+    for (cameras, files) in [
+        (colmap.clone(), &both[..]),
+        (colmap.join("images.txt"), &both),
+        (sample("bend", ""), &own),
+    ] {
+        let mut command = of_points(&cameras, &dir.path().join("out"));
+        let result: Value =
+            serde_json::from_str(&stdout(command.arg("--truth").arg(&truth))).unwrap();
+        let inputs = result["inputs"].as_array().unwrap();
+        let names: Vec<&str> = inputs.iter().map(|i| i["file"].as_str().unwrap()).collect();
+        let others = ["points_L.csv", "points_R.csv", "guidewire_3D.ply"];
+        for file in files.iter().chain(&others) {
+            assert!(names.iter().any(|name| name.ends_with(file)), "no {file} in {names:?}");
+        }
+        assert_eq!(inputs.len(), files.len() + others.len(), "{names:?}");
+    }
+}
+
+/// A straight curve, its unit stated or not.
+fn line_in(unit: Option<&str>, scale: f64, path: &Path) {
+    let mut csv = String::from("x,y,z");
+    csv += &unit.map(|unit| format!(",arc_length[{unit}]")).unwrap_or_default();
+    for k in 0..50 {
+        let s = scale * f64::from(k);
+        csv +=
+            &format!("\n{s},0,0{}", if unit.is_some() { format!(",{s}") } else { String::new() });
+    }
+    fs::write(path, csv + "\n").unwrap();
+}
+
+#[test]
+fn lengths_in_two_units_are_not_compared() {
+    let dir = TempDir::new().unwrap();
+    let file = |name: &str| dir.path().join(name);
+    line_in(Some("mm"), 1.0, &file("mm.csv"));
+    line_in(Some("m"), 1e-3, &file("m.csv"));
+    line_in(None, 1.0, &file("none.csv"));
+    let eval = |curve: &str, truth: &str| {
+        let mut command = accurate();
+        command.arg("eval").arg(file(curve)).arg("--truth").arg(file(truth));
+        command
+    };
+    let (code, said) = failure(&mut eval("m.csv", "mm.csv"));
+    assert!(code == 65 && said.contains("the curve is in m, the truth in mm"), "{code} {said}");
+    assert!(said.contains("hint"), "{said}");
+    // What states no unit has the other's.
+    for (curve, truth) in [("mm.csv", "none.csv"), ("none.csv", "mm.csv")] {
+        let scores: Value = serde_json::from_str(&stdout(&mut eval(curve, truth))).unwrap();
+        assert_eq!((&scores["unit"], &scores["overall"]), (&"mm".into(), &0.0.into()));
+    }
+    // The same for the truth of a reconstruction, and for cameras beside a curve.
+    let pair = file("pair");
+    for part in ["calibration", "points"] {
+        fs::create_dir_all(pair.join(part)).unwrap();
+        for entry in fs::read_dir(sample("bend", part)).unwrap() {
+            let entry = entry.unwrap();
+            fs::copy(entry.path(), pair.join(part).join(entry.file_name())).unwrap();
+        }
+    }
+    let meta = fs::read_to_string(sample("bend", "meta.json")).unwrap();
+    fs::write(pair.join("meta.json"), meta.replace("\"unit\": \"unit\"", "\"unit\": \"mm\""))
+        .unwrap();
+    let out = file("out");
+    let (code, said) = failure(of_points(&pair, &out).arg("--truth").arg(file("m.csv")));
+    assert!(code == 65 && said.contains("is in mm") && said.contains("m.csv in m"), "{said}");
+    assert!(!out.exists());
+    stdout(of_points(&pair, &out).arg("--truth").arg(file("mm.csv")));
+    let scores = stdout(eval("none.csv", "none.csv").arg("--pair").arg(&pair));
+    assert!(scores.contains("\"unit\":\"mm\""), "{scores}");
+    let (code, said) = failure(eval("m.csv", "none.csv").arg("--pair").arg(&pair));
+    assert!(code == 65 && said.contains("the pair in mm"), "{code} {said}");
+}
+
+#[test]
+fn a_name_that_two_views_have_is_refused() {
+    let dir = TempDir::new().unwrap();
+    let mut runs = Vec::new();
+    for (folder, angle) in [("one", -30.0), ("two", 40.0)] {
+        fs::create_dir(dir.path().join(folder)).unwrap();
+        let path = dir.path().join(folder).join("XA.dcm");
+        fs::write(&path, crate::dicom::view([angle, 0.0], 8, &[9; 64], &[])).unwrap();
+        runs.push(path);
+    }
+    let mut command = accurate();
+    command.args(["camera", "doctor", "--views", "XA,XA"]).args(&runs);
+    let (code, said) = failure(&mut command);
+    assert!(code == 2 && said.contains("2 views are called `XA`"), "{code} {said}");
+    // One file with two views of one name.
+    let views = dir.path().join("views.json");
+    converted("bend", "views-json", &views);
+    let mut text: Value = serde_json::from_str(&fs::read_to_string(&views).unwrap()).unwrap();
+    text[0]["name"] = "XA".into();
+    text[1]["name"] = "XA".into();
+    fs::write(&views, text.to_string()).unwrap();
+    let shape = dir.path().join("shape.csv");
+    line_in(None, 1.0, &shape);
+    let mut command = accurate();
+    command.args(["plan-views", "--view", "XA", "--first"]).arg(&views);
+    let (code, said) = failure(command.arg("--shape").arg(&shape));
+    assert!(code == 2 && said.contains("2 views are called `XA`"), "{code} {said}");
+}
+
+#[test]
+fn files_without_frames_take_none() {
+    let dir = TempDir::new().unwrap();
+    let rig = dir.path().join("rig.toml");
+    converted("bend", "rig-toml", &rig);
+    for input in ["image", "mask"] {
+        let mut command = accurate();
+        command.args(["reconstruct", "-i", input, "--frame", "3", "-o", "never", "--cameras"]);
+        command.arg(&rig).args(["L", "R"].map(|v| sample("bend", &format!("masks/mask_{v}.png"))));
+        let (code, said) = failure(&mut command);
+        assert!(code == 2 && said.contains("--frame"), "{code} {said}");
+    }
 }

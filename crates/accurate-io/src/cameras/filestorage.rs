@@ -7,7 +7,6 @@ use quick_xml::events::Event;
 use serde::Deserialize;
 
 use crate::IoError;
-use crate::bounded::{MAX_SMALL_BYTES, read_text};
 use crate::matrix::finite;
 
 /// Deepest nesting accepted; OpenCV's calibration files have 3.
@@ -31,8 +30,7 @@ pub(crate) type Storage = BTreeMap<String, Node>;
 
 /// Reads OpenCV's YAML. It is not YAML: the directive `%YAML:1.0` and the tag `!!opencv-matrix` are
 /// dropped before a YAML parser sees it.
-pub(crate) fn read_yaml(path: &Path) -> Result<Storage, IoError> {
-    let text = read_text(path, MAX_SMALL_BYTES)?;
+pub(crate) fn read_yaml(path: &Path, text: &str) -> Result<Storage, IoError> {
     let malformed = |line, reason: String| IoError::malformed(path, "OpenCV YAML", line, reason);
     let mut depth = 0usize;
     for (index, line) in text.lines().enumerate() {
@@ -73,14 +71,13 @@ struct Open {
 }
 
 /// Reads OpenCV's XML. Document types and entities other than those of XML itself are refused.
-pub(crate) fn read_xml(path: &Path) -> Result<Storage, IoError> {
-    let text = read_text(path, MAX_SMALL_BYTES)?;
+pub(crate) fn read_xml(path: &Path, text: &str) -> Result<Storage, IoError> {
     let malformed = |line, reason: String| IoError::malformed(path, "OpenCV XML", line, reason);
-    let mut reader = Reader::from_str(&text);
+    let mut reader = Reader::from_str(text);
     let mut open: Vec<Open> = Vec::new();
     loop {
         let at = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX);
-        let line = Some(crate::rig_file::line_at(&text, at));
+        let line = Some(crate::rig_file::line_at(text, at));
         match reader.read_event().map_err(|e| malformed(line, e.to_string()))? {
             Event::Start(tag) => {
                 if open.len() >= MAX_DEPTH {

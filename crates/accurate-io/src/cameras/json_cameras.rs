@@ -5,10 +5,9 @@ use accurate_geom::{Distortion, ImageSize, LengthUnit};
 use serde_json::{Map, Value};
 
 use super::detect::stem;
-use super::named_view::{RawView, ViewJson};
+use super::named_view::{RawView, ViewJson, side_px};
 use super::{NamedView, ViewDefaults};
 use crate::IoError;
-use crate::bounded::{MAX_SMALL_BYTES, read_text};
 use crate::matrix::finite;
 
 /// Reads cameras from JSON: one object, an array of them, or one per line. Told by its fields, each is
@@ -21,13 +20,16 @@ use crate::matrix::finite;
 ///   `extrinsic`, 4 x 4, world to camera. Its pixel centres lie half a pixel inside the detector's edge;
 /// - DeepDRR: `intrinsic`, 3 x 3, `extrinsic`, 4 x 4, camera from world, `sensor_width`,
 ///   `sensor_height`.
-pub(crate) fn read(path: &Path, defaults: &ViewDefaults) -> Result<Vec<NamedView>, IoError> {
-    let text = read_text(path, MAX_SMALL_BYTES)?;
+pub(crate) fn read(
+    path: &Path,
+    text: &str,
+    defaults: &ViewDefaults,
+) -> Result<Vec<NamedView>, IoError> {
     let malformed = |e: serde_json::Error| {
         IoError::malformed(path, "camera JSON", Some(e.line()), e.to_string())
     };
     let mut views = Vec::new();
-    for value in serde_json::Deserializer::from_str(&text).into_iter::<Value>() {
+    for value in serde_json::Deserializer::from_str(text).into_iter::<Value>() {
         match value.map_err(malformed)? {
             Value::Array(items) => {
                 for item in items {
@@ -81,12 +83,7 @@ fn number(path: &Path, map: &Map<String, Value>, key: &str) -> Result<f64, IoErr
 }
 
 fn pixels(path: &Path, map: &Map<String, Value>, key: &str) -> Result<u32, IoError> {
-    let value = number(path, map, key)?;
-    if (1.0..=1e6).contains(&value) && value.fract() == 0.0 {
-        Ok(value as u32)
-    } else {
-        Err(IoError::field(path, key, value.to_string(), "expected a whole number of px"))
-    }
+    side_px(path, key, number(path, map, key)?)
 }
 
 /// All numbers of a field, nested lists flattened in order.
@@ -223,8 +220,15 @@ fn matlab(path: &Path, map: &Map<String, Value>) -> Result<[RawView; 2], IoError
         };
         // Rows, then columns.
         let size = match list("ImageSize")?[..] {
-            [h, w] if h >= 1.0 && w >= 1.0 => Some(ImageSize { width: w as u32, height: h as u32 }),
-            _ => None,
+            [] => None,
+            [height, width] => Some(ImageSize {
+                width: side_px(path, "ImageSize", width)?,
+                height: side_px(path, "ImageSize", height)?,
+            }),
+            ref other => {
+                let reason = format!("expected [rows, columns], found {} numbers", other.len());
+                return Err(IoError::field(path, "ImageSize", "", reason));
+            }
         };
         let unit = match camera.get("WorldUnits").and_then(Value::as_str) {
             None => None,

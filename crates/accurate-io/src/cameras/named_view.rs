@@ -5,6 +5,7 @@ use accurate_geom::{Camera, Distortion, ImageSize, LengthUnit};
 use serde::{Deserialize, Serialize};
 
 use crate::IoError;
+use crate::unit::length_unit;
 
 /// One camera read from a file, with what its numbers mean.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +58,20 @@ impl RawView {
             camera = camera.with_distortion(lens).map_err(geometry)?;
         }
         Ok(NamedView { name: self.name, camera, unit, frame: self.frame, notes })
+    }
+}
+
+/// Largest accepted side of an image that a camera file states, px.
+const MAX_SIDE_PX: u32 = 1_000_000;
+
+/// A side of an image that a file gives as a number, px.
+pub(crate) fn side_px(path: &Path, field: &str, value: f64) -> Result<u32, IoError> {
+    if (1.0..=f64::from(MAX_SIDE_PX)).contains(&value) && value.fract() == 0.0 {
+        // Exact by the check above.
+        Ok(value as u32)
+    } else {
+        let reason = format!("expected a whole number of px from 1 to {MAX_SIDE_PX}");
+        Err(IoError::field(path, field, value.to_string(), reason))
     }
 }
 
@@ -130,10 +145,7 @@ impl NamedView {
 impl ViewJson {
     pub(crate) fn view(self, path: &Path) -> Result<NamedView, IoError> {
         let matrix = |rows: &[[f64; 3]; 3]| Matrix3::from_fn(|r, c| rows[r][c]);
-        let unit = self
-            .unit
-            .parse()
-            .map_err(|_| IoError::field(path, "unit", &self.unit, "expected mm, cm, m or unit"))?;
+        let unit = length_unit(path, "unit", &self.unit)?;
         let [width, height] = self.image_size;
         RawView {
             name: self.name,

@@ -5,9 +5,10 @@ use accurate_geom::{Distortion, ImageSize};
 
 use super::detect::stem;
 use super::filestorage::{Node, Storage, matrix, read_xml, read_yaml};
-use super::named_view::RawView;
+use super::named_view::{RawView, side_px};
 use super::{NamedView, ViewDefaults};
 use crate::IoError;
+use crate::unit::length_unit;
 
 /// The names that OpenCV's samples and their users give to one quantity; `#` is the view's number.
 const K: &[&str] = &["K#", "M#", "cameraMatrix#", "camera_matrix_#", "camera_matrix#", "CM#"];
@@ -17,37 +18,55 @@ const T: &[&str] = &["T", "t", "translation", "translation_vector", "tvec"];
 const K_ALONE: &[&str] = &["K", "M", "camera_matrix", "cameraMatrix", "mtx", "camera_intrinsics"];
 const D_ALONE: &[&str] = &["D", "distortion_coefficients", "distCoeffs", "dist_coeffs", "dist"];
 
+/// A FileStorage file and its text.
+pub(crate) struct StorageFile<'f> {
+    pub(crate) path: &'f Path,
+    pub(crate) text: &'f str,
+    pub(crate) syntax: Syntax,
+}
+
+/// How a FileStorage is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Syntax {
+    Yaml,
+    Xml,
+}
+
 fn keys(names: &[&str], number: &str) -> Vec<String> {
     names.iter().map(|name| name.replace('#', number)).collect()
 }
 
-/// Reads OpenCV FileStorage files (`true`: XML): a stereo calibration spread over any of them, or
-/// one camera per file.
+/// Reads OpenCV FileStorage files: a stereo calibration spread over any of them, or one camera per
+/// file.
 ///
 /// Stereo: `K1 D1 K2 D2 R T` under the usual names, `x_cam2 = R x_cam1 + T`, the world being camera
-/// 1's frame, unless the files also hold `RT1` and `RT2` (3 x 4, world to camera) as ours do.
+/// 1's frame, unless the files also hold `RT1` and `RT2` (3 x 4, world to camera) as ours do. So for
+/// sizes: one for both views, or `image_width1`, `image_height1` and so on where they differ.
 pub(crate) fn read(
-    files: &[(&Path, bool)],
+    files: &[StorageFile<'_>],
     defaults: &ViewDefaults,
 ) -> Result<Vec<NamedView>, IoError> {
     let storages: Vec<Storage> = files
         .iter()
-        .map(|&(path, xml)| if xml { read_xml(path) } else { read_yaml(path) })
+        .map(|file| match file.syntax {
+            Syntax::Yaml => read_yaml(file.path, file.text),
+            Syntax::Xml => read_xml(file.path, file.text),
+        })
         .collect::<Result<_, _>>()?;
     let path_of = |names: &[String]| {
         let holds = |storage: &Storage| names.iter().any(|name| storage.contains_key(name));
-        storages.iter().position(holds).map_or(files[0].0, |i| files[i].0)
+        storages.iter().position(holds).map_or(files[0].path, |i| files[i].path)
     };
     let stereo = storages.iter().any(|s| keys(K, "2").iter().any(|key| s.contains_key(key)));
     if !stereo {
         return files
             .iter()
             .zip(&storages)
-            .map(|(&(path, _), storage)| single(path, storage)?.check(path, defaults))
+            .map(|(file, storage)| single(file.path, storage)?.check(file.path, defaults))
             .collect();
     }
     let mut merged = Storage::new();
-    for ((path, _), storage) in files.iter().zip(&storages) {
+    for (StorageFile { path, .. }, storage) in files.iter().zip(&storages) {
         for (key, node) in storage {
             if merged.insert(key.clone(), node.clone()).is_some_and(|old| old != *node) {
                 let reason = "two of the files give it different values";
@@ -79,11 +98,11 @@ pub(crate) fn read(
         };
         views.push(
             RawView {
-                name: format!("{}_{number}", stem(files[0].0)),
+                name: format!("{}_{number}", stem(files[0].path)),
                 k: intrinsics(path, &k)?,
                 r: Matrix3::from_fn(|i, j| r[(i, j)]),
                 t: Vector3::from_fn(|i, _| t[i]),
-                size: size(path, &merged)?,
+                size: size(path, &merged, number)?,
                 distortion: lens(path, matrix(path, &merged, &keys(D, number))?)?,
                 unit: unit(path, &merged)?,
                 frame: frame.into(),
@@ -118,7 +137,7 @@ fn single(path: &Path, storage: &Storage) -> Result<RawView, IoError> {
         k: intrinsics(path, &k)?,
         r: Matrix3::from_fn(|i, j| r[(i, j)]),
         t: Vector3::from_fn(|i, _| t[i]),
-        size: size(path, storage)?,
+        size: size(path, storage, "")?,
         distortion: lens(path, matrix(path, storage, &d_keys)?)?,
         unit: unit(path, storage)?,
         frame: "as in the file".into(),
@@ -198,36 +217,55 @@ fn lens(path: &Path, m: Option<DMatrix<f64>>) -> Result<Option<Distortion>, IoEr
     Ok(Some(Distortion { k1: v[0], k2: v[1], p1: v[2], p2: v[3], k3 }))
 }
 
-fn size(path: &Path, storage: &Storage) -> Result<Option<ImageSize>, IoError> {
-    let whole = |key: &str| -> Result<Option<u32>, IoError> {
-        match storage.get(key) {
+/// The image size of view `number` if the file gives the views their own, else the size of all.
+fn size(path: &Path, storage: &Storage, number: &str) -> Result<Option<ImageSize>, IoError> {
+    if !number.is_empty()
+        && let Some(own) = stated_size(path, storage, number)?
+    {
+        return Ok(Some(own));
+    }
+    stated_size(path, storage, "")
+}
+
+fn stated_size(path: &Path, storage: &Storage, number: &str) -> Result<Option<ImageSize>, IoError> {
+    let side = |key: String| -> Result<Option<u32>, IoError> {
+        match storage.get(&key) {
             None => Ok(None),
-            Some(Node::Number(v)) if *v >= 1.0 && *v <= 1e6 && v.fract() == 0.0 => {
-                Ok(Some(*v as u32))
-            }
+            Some(Node::Number(v)) => side_px(path, &key, *v).map(Some),
             Some(_) => Err(IoError::field(path, key, "", "expected a whole number of px")),
         }
     };
-    match (whole("image_width")?, whole("image_height")?) {
-        (Some(width), Some(height)) => Ok(Some(ImageSize { width, height })),
-        _ => match storage.get("image_size").or_else(|| storage.get("imageSize")) {
-            Some(Node::List(list)) => match list[..] {
-                [Node::Number(w), Node::Number(h)] if w >= 1.0 && h >= 1.0 => {
-                    Ok(Some(ImageSize { width: w as u32, height: h as u32 }))
-                }
-                _ => Err(IoError::field(path, "image_size", "", "expected [width, height]")),
-            },
-            _ => Ok(None),
-        },
+    let sides = (side(format!("image_width{number}"))?, side(format!("image_height{number}"))?);
+    if let (Some(width), Some(height)) = sides {
+        return Ok(Some(ImageSize { width, height }));
     }
+    let keys = keys(&["image_size#", "imageSize#"], number);
+    let Some((key, node)) = keys.iter().find_map(|key| storage.get(key).map(|node| (key, node)))
+    else {
+        return Ok(None);
+    };
+    let sides: Option<Vec<f64>> = match node {
+        Node::List(list) => list
+            .iter()
+            .map(|side| match side {
+                Node::Number(v) => Some(*v),
+                _ => None,
+            })
+            .collect(),
+        Node::Map(_) => matrix(path, storage, std::slice::from_ref(key))?
+            .map(|sides| sides.iter().copied().collect()),
+        _ => None,
+    };
+    let Some(&[width, height]) = sides.as_deref() else {
+        return Err(IoError::field(path, key, "", "expected [width, height]"));
+    };
+    let (width, height) = (side_px(path, key, width)?, side_px(path, key, height)?);
+    Ok(Some(ImageSize { width, height }))
 }
 
 fn unit(path: &Path, storage: &Storage) -> Result<Option<accurate_geom::LengthUnit>, IoError> {
     match storage.get("unit") {
-        Some(Node::Text(text)) => text
-            .parse()
-            .map(Some)
-            .map_err(|_| IoError::field(path, "unit", text, "expected mm, cm, m or unit")),
+        Some(Node::Text(text)) => length_unit(path, "unit", text).map(Some),
         _ => Ok(None),
     }
 }

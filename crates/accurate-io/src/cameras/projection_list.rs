@@ -9,7 +9,6 @@ use super::detect::stem;
 use super::named_view::no_size;
 use super::{NamedView, ViewDefaults};
 use crate::IoError;
-use crate::bounded::{MAX_SMALL_BYTES, read_bytes, read_text as read_whole};
 use crate::matrix::{finite, parse_number};
 
 const FORMAT: &str = "list of 3 x 4 matrices";
@@ -34,10 +33,13 @@ pub(crate) fn looks_like(text: &str) -> bool {
 
 /// Reads projection matrices of views one below the other: 3 rows of 4 numbers each, separated by
 /// white space, commas or semicolons; `#` begins a comment line.
-pub(crate) fn read_text(path: &Path, defaults: &ViewDefaults) -> Result<Vec<NamedView>, IoError> {
-    let text = read_whole(path, MAX_SMALL_BYTES)?;
+pub(crate) fn read_text(
+    path: &Path,
+    text: &str,
+    defaults: &ViewDefaults,
+) -> Result<Vec<NamedView>, IoError> {
     let mut values = Vec::new();
-    for (line, row) in rows(&text) {
+    for (line, row) in rows(text) {
         if row.len() != 4 {
             let reason = format!("a row of {} numbers; expected 4", row.len());
             return Err(IoError::malformed(path, FORMAT, Some(line), reason));
@@ -50,12 +52,14 @@ pub(crate) fn read_text(path: &Path, defaults: &ViewDefaults) -> Result<Vec<Name
 }
 
 /// Reads projection matrices from NPY: shape (3, 4) or (n, 3, 4), little-endian f8, C order.
-pub(crate) fn read_npy(path: &Path, defaults: &ViewDefaults) -> Result<Vec<NamedView>, IoError> {
-    let bytes = read_bytes(path, MAX_SMALL_BYTES)?;
+pub(crate) fn read_npy(
+    path: &Path,
+    bytes: &[u8],
+    defaults: &ViewDefaults,
+) -> Result<Vec<NamedView>, IoError> {
     let malformed = |reason: String| IoError::malformed(path, "NPY", None, reason);
-    let length = crate::npy::check_header(&bytes).map_err(malformed)?;
-    let header =
-        Header::from_reader(&mut bytes.as_slice()).map_err(|e| malformed(e.to_string()))?;
+    let length = crate::npy::check_header(bytes).map_err(malformed)?;
+    let header = Header::from_reader(&mut &bytes[..]).map_err(|e| malformed(e.to_string()))?;
     let count = match header.shape[..] {
         [3, 4] => Some(1),
         [n, 3, 4] => Some(n),

@@ -13,15 +13,18 @@ use crate::rig_file::write_rig;
 /// What cameras can be written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum CameraFormat {
-    /// OpenCV FileStorage YAML; one or two views.
+    /// OpenCV FileStorage YAML; one or two views. Where two views differ in size it holds
+    /// `image_width1`, `image_height1` and so on, which our reader knows and OpenCV leaves alone.
     OpencvYaml,
-    /// OpenCV FileStorage XML; one or two views.
+    /// OpenCV FileStorage XML; one or two views, as [`Self::OpencvYaml`].
     OpencvXml,
-    /// A folder of COLMAP text files.
+    /// A folder of COLMAP text files. Rotations become quaternions and the principal point moves by
+    /// half a pixel, so both come back off in their last digits.
     Colmap,
     /// Our rig file (TOML or JSON by the extension); two views.
     Rig,
-    /// 3 x 4 matrices one below the other.
+    /// 3 x 4 matrices one below the other. Reading takes `K`, `R` and `t` out of their product, off in
+    /// the last digits; sizes and units are comments.
     MatrixText,
     /// An array of views as `camera show --json` prints them.
     ViewsJson,
@@ -85,12 +88,16 @@ enum Entry {
 /// What goes into the file, in order. Two views: OpenCV's own stereo names (`x_cam2 = R x_cam1 + T`),
 /// and `RT1`, `RT2`, which keep our world.
 fn opencv_values(views: &[NamedView]) -> Vec<(String, Entry)> {
-    let size = views[0].camera.size();
-    let mut values = vec![
-        ("image_width".to_owned(), Entry::Whole(size.width)),
-        ("image_height".to_owned(), Entry::Whole(size.height)),
-        ("unit".to_owned(), Entry::Word(views[0].unit.label())),
-    ];
+    let mut values = Vec::new();
+    let sizes: Vec<_> = views.iter().map(|view| view.camera.size()).collect();
+    // OpenCV knows one size for both views; numbered ones are ours, for views that differ.
+    let agree = sizes.iter().all(|size| *size == sizes[0]);
+    for (index, size) in sizes.iter().enumerate().take(if agree { 1 } else { sizes.len() }) {
+        let number = if agree { String::new() } else { (index + 1).to_string() };
+        values.push((format!("image_width{number}"), Entry::Whole(size.width)));
+        values.push((format!("image_height{number}"), Entry::Whole(size.height)));
+    }
+    values.push(("unit".to_owned(), Entry::Word(views[0].unit.label())));
     let dense = |rows, cols, of: &dyn Fn(usize, usize) -> f64| {
         Entry::Matrix(DMatrix::from_fn(rows, cols, of))
     };

@@ -4,10 +4,10 @@ use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use accurate_geom::View1;
+use accurate_geom::{ImageSize, View1};
 use accurate_io::{
-    IoError, PairParts, read_curve, read_grey, read_mask, read_matrix3, read_pair, read_points,
-    read_rig,
+    IoError, PairParts, ViewDefaults, read_cameras, read_curve, read_grey, read_mask, read_matrix3,
+    read_pair, read_points, read_rig,
 };
 
 /// Reads a file; `Ok(false)` if a number in the result is not finite.
@@ -29,6 +29,13 @@ pub fn rig(path: &Path) -> Result<bool, IoError> {
     Ok([rig.camera1(), rig.camera2()]
         .iter()
         .all(|c| c.projection_matrix().iter().all(|v| v.is_finite())))
+}
+
+pub fn cameras(path: &Path) -> Result<bool, IoError> {
+    let image_size = Some(ImageSize { width: 640, height: 480 });
+    let views = read_cameras(&[path.to_owned()], &ViewDefaults { image_size, unit: None })?;
+    let finite = |v: &f64| v.is_finite();
+    Ok(!views.is_empty() && views.iter().all(|v| v.camera.projection_matrix().iter().all(finite)))
 }
 
 pub fn image(path: &Path) -> Result<bool, IoError> {

@@ -62,8 +62,8 @@ impl NetworkSegmenter {
 
     /// Probability of the body per pixel, 0 to 1.
     ///
-    /// The image is normalised as a whole, its sides made multiples of the network's by reflection,
-    /// and read at once or, above the model's limit, in windows that overlap by half and count by a
+    /// The image is normalised as a whole, its sides made multiples of the network's by going on with its
+    /// border, and read at once or, above the model's limit, in windows that overlap by half and count by a
     /// Gaussian of their middle.
     ///
     /// # Errors

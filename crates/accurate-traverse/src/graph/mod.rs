@@ -63,6 +63,16 @@ pub struct GraphEdge<V: View> {
     pub link: bool,
 }
 
+/// The most strands that are taken for parts of one body; a wire of twelve control points that crosses
+/// itself all over has some sixty.
+const MOST_STRANDS: usize = 256;
+/// The most chains of pixels, with the artefacts of thinning among them.
+const MOST_CHAINS: usize = 4096;
+
+fn refuse_tangle(view: u8, strands: usize, limit: usize) -> Result<(), TraverseError> {
+    if strands > limit { Err(TraverseError::Tangled { view, strands, limit }) } else { Ok(()) }
+}
+
 /// The skeleton of a mask as a graph: tips and junctions joined by smooth polylines, and links over
 /// gaps.
 ///
@@ -93,7 +103,7 @@ impl<V: View> SkeletonGraph<V> {
     ///
     /// # Errors
     /// [`TraverseError::ShapeMismatch`], [`TraverseError::Empty`], [`TraverseError::TooSmall`],
-    /// [`TraverseError::NoEdge`], [`TraverseError::BadRadius`], and
+    /// [`TraverseError::NoEdge`], [`TraverseError::BadRadius`], [`TraverseError::Tangled`], and
     /// [`TraverseError::InvalidParameter`] for a thickness that is not positive or a bad field of
     /// `params`.
     ///
@@ -130,7 +140,9 @@ impl<V: View> SkeletonGraph<V> {
             _ => {}
         }
         let mut rough = pixels::trace(skeleton, radii);
+        refuse_tangle(view, rough.edges.len(), MOST_CHAINS)?;
         rough.simplify(mask_thickness_px, params);
+        refuse_tangle(view, rough.edges.len(), MOST_STRANDS)?;
         if rough.edges.is_empty() {
             return Err(TraverseError::NoEdge { view, pixels });
         }

@@ -56,12 +56,13 @@ impl RoughGraph {
     pub fn simplify(&mut self, mask_thickness_px: f64, params: &GraphParams) {
         let spur = params.spur_length_px(mask_thickness_px);
         loop {
-            let degree = self.degrees();
+            let incident = self.incident();
+            let degree: Vec<usize> = incident.iter().map(Vec::len).collect();
             // Merging first: it makes edges longer, so that fewer are too short.
             let merge = (0..self.nodes.len()).find(|&node| {
                 degree[node] == 2 && !self.edges.iter().any(|e| e.ends == [node, node])
             });
-            let step = merge.map(Step::Merge).or_else(|| self.shortest(&degree, spur, params));
+            let step = merge.map(Step::Merge).or_else(|| self.shortest(&incident, spur, params));
             match step {
                 Some(Step::Drop(edge)) => {
                     self.edges.swap_remove(edge);
@@ -81,27 +82,37 @@ impl RoughGraph {
         degree
     }
 
+    /// The edges at each node, a loop twice.
+    fn incident(&self) -> Vec<Vec<usize>> {
+        let mut incident = vec![Vec::new(); self.nodes.len()];
+        for (index, edge) in self.edges.iter().enumerate() {
+            edge.ends.iter().for_each(|&node| incident[node].push(index));
+        }
+        incident
+    }
+
     /// The shortest edge that has no right to exist.
-    fn shortest(&self, degree: &[usize], spur: f64, params: &GraphParams) -> Option<Step> {
+    fn shortest(&self, incident: &[Vec<usize>], spur: f64, params: &GraphParams) -> Option<Step> {
+        let degree = |node: usize| incident[node].len();
         let longest = self.edges.iter().map(|e| e.length).fold(0.0, f64::max);
         let mut best: Option<(f64, f64, Step)> = None;
         for (index, edge) in self.edges.iter().enumerate() {
             let [a, b] = edge.ends;
-            let (low, high) = (degree[a].min(degree[b]), degree[a].max(degree[b]));
+            let (low, high) = (degree(a).min(degree(b)), degree(a).max(degree(b)));
             let (limit, contract) = if a == b {
                 // A loop on its own is a piece, not an appendix.
-                (if degree[a] == 2 { params.piece_px } else { params.loop_per_spur * spur }, false)
+                (if degree(a) == 2 { params.piece_px } else { params.loop_per_spur * spur }, false)
             } else if low == 1 {
                 (if high == 1 { params.piece_px } else { spur }, false)
             } else {
                 (params.contract_px, true)
             };
-            let whole_piece = high == 1 || (a == b && degree[a] == 2);
+            let whole_piece = high == 1 || (a == b && degree(a) == 2);
             if edge.length >= limit || (whole_piece && edge.length >= longest) {
                 continue;
             }
             // Of two spurs of one length the one that continues the body less straight goes first.
-            let bend = if low == 1 && high > 1 { self.straightness(index, degree) } else { 0.0 };
+            let bend = if low == 1 && high > 1 { self.straightness(index, incident) } else { 0.0 };
             let better = best.as_ref().is_none_or(|(length, b, _)| {
                 (edge.length, bend) < (*length - 1e-9, *b)
                     || (edge.length < *length + 1e-9 && bend < *b - 1e-9)
@@ -115,13 +126,14 @@ impl RoughGraph {
     }
 
     /// Largest cosine between the spur's direction and that of a body that goes on into it.
-    fn straightness(&self, spur: usize, degree: &[usize]) -> f64 {
+    fn straightness(&self, spur: usize, incident: &[Vec<usize>]) -> f64 {
         let edge = &self.edges[spur];
-        let side = usize::from(degree[edge.ends[0]] == 1);
+        let side = usize::from(incident[edge.ends[0]].len() == 1);
         let (node, away) = (edge.ends[side], edge.leaving(side, 6.0));
-        let others = self.edges.iter().enumerate().filter(|&(index, _)| index != spur);
+        let others = incident[node].iter().filter(|&&index| index != spur);
         others
-            .flat_map(|(_, e)| {
+            .map(|&index| &self.edges[index])
+            .flat_map(|e| {
                 (0..2)
                     .filter(move |&s| e.ends[s] == node)
                     .map(move |s| -e.leaving(s, 10.0).dot(&away))
@@ -135,6 +147,9 @@ impl RoughGraph {
         let middle = points[0] + (points[points.len() - 1] - points[0]) * 0.5;
         self.nodes[a] = middle;
         for edge in &mut self.edges {
+            if !edge.ends.iter().any(|&node| node == a || node == b) {
+                continue;
+            }
             let last = edge.points.len() - 1;
             for (side, at) in [(0, 0), (1, last)] {
                 if edge.ends[side] == a || edge.ends[side] == b {

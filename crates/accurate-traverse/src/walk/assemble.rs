@@ -122,7 +122,6 @@ pub(super) fn assemble<V: View>(graph: &SkeletonGraph<V>, turns: &Turns, walk: P
         cost,
         ends,
         decisions,
-        folds: Vec::new(),
         coverage: covered / graph.length_px(),
     }
 }

@@ -2,7 +2,6 @@
 
 mod assemble;
 mod beam;
-mod folds;
 mod params;
 mod prices;
 mod turns;
@@ -11,7 +10,6 @@ use std::collections::BTreeSet;
 
 use accurate_geom::{Pixel, View};
 
-pub use folds::{Fold, FoldParams, fold_variants};
 pub use params::WalkParams;
 
 use crate::{SkeletonGraph, TraverseError};
@@ -31,7 +29,7 @@ pub struct HalfEdge {
 pub struct WalkCost {
     /// Bends at nodes.
     pub bending: f64,
-    /// Turning round: at tips, other nodes and in folds.
+    /// Turning round: at tips and other nodes.
     pub u_turns: f64,
     /// Starting and ending elsewhere than at tips.
     pub ends: f64,
@@ -110,8 +108,6 @@ pub struct Walk<V: View> {
     pub ends: [WalkEnd; 2],
     /// One entry per node passed.
     pub decisions: Vec<Decision<V>>,
-    /// Folds added by [`fold_variants`]; a walk through the graph has none.
-    pub folds: Vec<Fold<V>>,
     /// Part of the body's length walked along, 0 to 1.
     pub coverage: f64,
 }

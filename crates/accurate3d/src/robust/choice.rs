@@ -46,6 +46,11 @@ impl Settled {
         Self { fits, calibrations, evidence, choice }
     }
 
+    /// Whether most of what the views show is not this body: no other walk through it explains it.
+    pub(crate) fn is_hopeless(&self) -> bool {
+        self.fits[0].fit.judgement.unexplained_share() > 0.3
+    }
+
     /// Takes one of the contenders. One that had no last fit is taken under the calibration of the one
     /// before.
     pub(crate) fn prefer(

@@ -1,4 +1,4 @@
-use accurate_fit::{CalibrationEstimate, CalibrationPriors, OutlineFit};
+use accurate_fit::{CalibrationEstimate, CalibrationPriors, FitError, OutlineFit};
 use accurate_geom::{Pixel, Rig, View1, View2};
 use accurate_match::ProposeParams;
 use accurate_traverse::WalkParams;
@@ -106,6 +106,23 @@ impl RobustParams {
         calibration: None,
         second_look: SecondLook::InDoubt,
     };
+
+    /// Refuses weights and priors that nothing can be compared by.
+    pub(crate) fn validate(&self) -> Result<(), FitError> {
+        for (name, value) in [
+            ("contenders", self.contenders),
+            ("walk_weight", self.walk_weight),
+            ("clear_lead", self.clear_lead),
+            ("good_unexplained", self.good_unexplained),
+            ("good_chi_per_point", self.good_chi_per_point),
+            ("good_distance_px", self.good_distance_px),
+        ] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(FitError::BadParameter { name, value });
+            }
+        }
+        self.calibration.map_or(Ok(()), |priors| priors.validate())
+    }
 }
 
 /// What the joint choice settled on.
@@ -148,11 +165,12 @@ pub(crate) fn reconstruct_masks(
     let look = |turn| Look { masks, probabilities, rig, params, closure, turn, case }.look();
     let limits = if probabilities.is_some() { &Limits::MAPS } else { &Limits::MASKS };
     let in_doubt = |seen: &Seen| !suspicions(&seen.evidence(), limits).is_empty();
+    let worth_it = |seen: &Seen| !seen.is_hopeless() && in_doubt(seen);
     let mut seen = look(Turn::NONE)?;
     for turn in Turn::OTHERS {
         // Every pair of closed walks has been fitted from everywhere.
         let again =
-            closure == Closure::Open && params.turned && params.second_look.is_due(in_doubt(&seen));
+            closure == Closure::Open && params.turned && params.second_look.is_due(worth_it(&seen));
         if !again {
             break;
         }

@@ -60,7 +60,7 @@ impl Look<'_> {
             search.rig = corrected;
             settled = settle(&search, None)?;
         }
-        let in_doubt = calls_for_a_second_look(&settled.evidence);
+        let in_doubt = !settled.is_hopeless() && calls_for_a_second_look(&settled.evidence);
         let again = closure == Closure::Open && params.second_look.is_due(in_doubt);
         if again {
             search.effort = Effort::Thorough;
@@ -95,6 +95,11 @@ impl Seen {
     /// score.
     pub(crate) fn contenders(&self) -> Vec<(&Candidate, f64)> {
         contenders(&self.settled.fits, &self.settled.choice.finalists)
+    }
+
+    /// Whether no harder look can help.
+    pub(crate) fn is_hopeless(&self) -> bool {
+        self.settled.is_hopeless()
     }
 
     /// What the curves are fitted under, if the calibration is an unknown.

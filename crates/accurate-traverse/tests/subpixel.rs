@@ -1,0 +1,122 @@
+//! Middles and ends of bodies between the pixels, and masks that are none of one body.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use accurate_geom::{Pixel, View1};
+use accurate_traverse::{GraphParams, SkeletonGraph, TraverseError, extend_to_body_ends, recentre};
+use ndarray::Array2;
+use proptest::prelude::*;
+
+/// Distance of each pixel of a straight bar to its outside, 0 outside: the pixels whose centres lie within
+/// `half` of the segment from `a` to `b`.
+fn radii(a: [f64; 2], b: [f64; 2], half: f64) -> Array2<f64> {
+    let inside = |x: f64, y: f64| {
+        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        let t = ((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy);
+        let t = t.clamp(0.0, 1.0);
+        (x - a[0] - t * dx).hypot(y - a[1] - t * dy) <= half
+    };
+    let mask = Array2::from_shape_fn((90, 90), |(y, x)| inside(x as f64, y as f64));
+    Array2::from_shape_fn((90, 90), |(y, x)| {
+        if !mask[[y, x]] {
+            return 0.0;
+        }
+        let around = 9_usize;
+        let mut nearest = f64::INFINITY;
+        for r in y.saturating_sub(around)..(y + around + 1).min(90) {
+            for c in x.saturating_sub(around)..(x + around + 1).min(90) {
+                if !mask[[r, c]] {
+                    nearest = nearest.min((r as f64 - y as f64).hypot(c as f64 - x as f64));
+                }
+            }
+        }
+        nearest
+    })
+}
+
+fn ends(angle: f64) -> ([f64; 2], [f64; 2]) {
+    let (s, c) = angle.sin_cos();
+    ([44.3 - 30.0 * c, 44.8 - 30.0 * s], [44.3 + 30.0 * c, 44.8 + 30.0 * s])
+}
+
+fn along(a: [f64; 2], b: [f64; 2], t: f64) -> [f64; 2] {
+    [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn a_line_beside_the_middle_of_a_bar_comes_to_its_middle(
+        angle in 0.0..3.1f64, aside in -0.9..0.9f64, half in 2.0..4.0f64,
+    ) {
+        let (a, b) = ends(angle);
+        let radii = radii(a, b, half);
+        let (s, c) = angle.sin_cos();
+        let line: Vec<Pixel<View1>> = (0..51)
+            .map(|k| along(a, b, 0.1 + 0.8 * f64::from(k) / 50.0))
+            .map(|[x, y]| Pixel::new(x - aside * s, y + aside * c))
+            .collect();
+        let middle = recentre(&line, &radii, 2.0 * half).unwrap();
+        prop_assert_eq!(middle.len(), line.len());
+        let off = |p: &Pixel<View1>| ((p.y - a[1]) * c - (p.x - a[0]) * s).abs();
+        let mean = |line: &[Pixel<View1>]| line.iter().map(off).sum::<f64>() / line.len() as f64;
+        // The rim is known to half a pixel, on some 2 * half * 4 pixels of a window: 0.2 px each, and
+        // neighbouring windows share most of theirs.
+        prop_assert!(mean(&middle) < 0.25, "{} from {}", mean(&middle), aside);
+        prop_assert!(mean(&middle) <= mean(&line) + 0.25);
+        for (before, after) in line.iter().zip(&middle) {
+            prop_assert!(before.distance(*after) <= 2.0 + 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_line_that_stops_short_is_drawn_out_to_where_the_body_ends(
+        angle in 0.0..3.1f64, half in 1.5..4.0f64, short_px in 2.0..9.0f64,
+    ) {
+        let (a, b) = ends(angle);
+        let radii = radii(a, b, half);
+        let cut = short_px / 60.0;
+        let line: Vec<Pixel<View1>> = (0..51)
+            .map(|k| along(a, b, cut + (1.0 - 2.0 * cut) * f64::from(k) / 50.0))
+            .map(|[x, y]| Pixel::new(x, y))
+            .collect();
+        let whole = extend_to_body_ends(&line, &radii, 2.0 * half).unwrap();
+        for (tip, end) in [(whole[0], a), (whole[whole.len() - 1], b)] {
+            // The cap is known to a pixel, and the free length is walked in steps of half of one.
+            let off = tip.distance(Pixel::new(end[0], end[1]));
+            prop_assert!(off < 1.5, "{off} after {short_px}");
+        }
+        prop_assert!(whole.windows(2).all(|w| w[0].distance(w[1]) <= 60.0 / 50.0 + 1e-9));
+        // What reaches the end already stays.
+        let again = extend_to_body_ends(&whole, &radii, 2.0 * half).unwrap();
+        prop_assert!(again[0].distance(whole[0]) < 1.0);
+    }
+}
+
+#[test]
+fn bad_thicknesses_are_refused() {
+    let none = Array2::zeros((5, 5));
+    for thickness in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let refused = recentre::<View1>(&[], &none, thickness).unwrap_err();
+        assert!(matches!(refused, TraverseError::InvalidParameter { .. }), "{refused}");
+        let refused = extend_to_body_ends::<View1>(&[], &none, thickness).unwrap_err();
+        assert!(matches!(refused, TraverseError::InvalidParameter { .. }), "{refused}");
+    }
+}
+
+#[test]
+fn a_mask_of_hundreds_of_strokes_is_no_body() {
+    let strokes = |count: usize| {
+        Array2::from_shape_fn((400, 400), |(y, x)| {
+            y % 10 == 5 && x % 20 >= 3 && x % 20 < 17 && (y / 10) * 20 + x / 20 < count
+        })
+    };
+    let graph = |count: usize| {
+        let skeleton = strokes(count);
+        let radii = skeleton.mapv(|set| if set { 1.0 } else { 0.0 });
+        SkeletonGraph::<View1>::new(&skeleton, &radii, 1.0, &GraphParams::DEFAULT)
+    };
+    assert!(graph(100).is_ok());
+    let refused = graph(300).unwrap_err();
+    assert_eq!(refused, TraverseError::Tangled { view: 1, strands: 300, limit: 256 });
+}
