@@ -42,6 +42,17 @@ pub enum SegError {
         /// Columns, px.
         width: usize,
     },
+    /// Most pixels are foreground: no picture of a thin body.
+    #[error(
+        "{foreground} of {pixels} pixels of the mask are foreground: a thin body covers a few; is the \
+         mask inverted?"
+    )]
+    MostlyForeground {
+        /// Foreground pixels.
+        foreground: usize,
+        /// All pixels.
+        pixels: usize,
+    },
     /// A pixel is NaN or infinite.
     #[error("pixel at row {row}, column {column} is not finite: {value}")]
     NotFinite {

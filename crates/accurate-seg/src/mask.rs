@@ -98,6 +98,19 @@ impl Mask {
         Ok(())
     }
 
+    /// Refuses a mask without foreground, and one that is mostly foreground.
+    ///
+    /// # Errors
+    /// [`SegError::EmptyMask`], [`SegError::MostlyForeground`].
+    pub fn require_thin_body(&self) -> Result<(), SegError> {
+        self.require_foreground()?;
+        let (foreground, pixels) = (self.foreground().count(), self.height() * self.width());
+        if 2 * foreground > pixels {
+            return Err(SegError::MostlyForeground { foreground, pixels });
+        }
+        Ok(())
+    }
+
     /// Refuses a map of other pixels than the mask's, or one that is not finite everywhere.
     ///
     /// # Errors

@@ -55,6 +55,16 @@ fn weights_and_priors_that_nothing_can_be_compared_by_are_refused() {
     }
 }
 
+#[test]
+fn an_inverted_mask_is_told_what_it_looks_like() {
+    for spoil in [|mask: &mut Array2<bool>| mask.mapv_inplace(|b| !b), |mask: &mut Array2<bool>| mask.fill(true)] {
+        let mut pair = pair();
+        spoil(&mut pair.masks.as_mut().unwrap()[1]);
+        let error = reconstruct(&pair, &params()).unwrap_err().to_string();
+        assert!(error.contains("view 2") && error.contains("inverted"), "{error}");
+    }
+}
+
 /// Two bodies in one mask: the curve explains one of them, and no harder search is made for the other.
 #[test]
 fn masks_of_two_bodies_give_one_curve_and_a_doubt() {

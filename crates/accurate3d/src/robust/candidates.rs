@@ -46,7 +46,7 @@ impl<V: View> ViewCandidates<V> {
         let traversal = |source| Error::Traversal { case: case.to_owned(), source };
         let fitting = |source| Error::Fitting { case: case.to_owned(), source };
         let whole = Mask::from_array(array.clone()).map_err(segmentation)?;
-        whole.require_foreground().map_err(segmentation)?;
+        whole.require_thin_body().map_err(segmentation)?;
         let outline = match probability {
             Some(map) => Outline::from_probability(map.view(), array.view()),
             None => Outline::from_mask(array.view()),
