@@ -57,7 +57,10 @@ fn weights_and_priors_that_nothing_can_be_compared_by_are_refused() {
 
 #[test]
 fn an_inverted_mask_is_told_what_it_looks_like() {
-    for spoil in [|mask: &mut Array2<bool>| mask.mapv_inplace(|b| !b), |mask: &mut Array2<bool>| mask.fill(true)] {
+    for spoil in [
+        |mask: &mut Array2<bool>| mask.mapv_inplace(|b| !b),
+        |mask: &mut Array2<bool>| mask.fill(true),
+    ] {
         let mut pair = pair();
         spoil(&mut pair.masks.as_mut().unwrap()[1]);
         let error = reconstruct(&pair, &params()).unwrap_err().to_string();
