@@ -64,7 +64,7 @@ pub struct GraphEdge<V: View> {
 }
 
 /// The most strands that are taken for parts of one body; a wire of twelve control points that crosses
-/// itself all over has some sixty.
+/// itself all over has some fifty.
 const MOST_STRANDS: usize = 256;
 /// The most chains of pixels, with the artefacts of thinning among them.
 const MOST_CHAINS: usize = 4096;
