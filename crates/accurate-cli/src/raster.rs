@@ -8,7 +8,7 @@ use resvg::usvg::{Options, Tree};
 
 use crate::code::Code;
 use crate::failure::Failure;
-use crate::text::write_text;
+use crate::text::{has_extension, write_text};
 
 /// The font of all letters: no picture depends on what is installed.
 const FONT: &[u8] = include_bytes!("../assets/DejaVuSans-subset.ttf");
@@ -40,10 +40,6 @@ pub fn write_picture(path: &Path, svg: &str, png_scale: f32) -> Result<(), Failu
 
 fn is_png(path: &Path) -> bool {
     has_extension(path, "png")
-}
-
-fn has_extension(path: &Path, extension: &str) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
 }
 
 fn png(svg: &str, scale: f32) -> Result<Vec<u8>, Failure> {

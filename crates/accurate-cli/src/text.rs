@@ -15,6 +15,11 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
     })
 }
 
+/// Whether a name ends in `.extension`, in any case.
+pub fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}
+
 /// Writes a text file whole or not at all.
 pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     write_atomically(path, |file| file.write_all(text.as_bytes())).map_err(Failure::of_output)

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use accurate3d::InputKind;
 use accurate3d::io::{
-    FrameChoice, NamedView, Pair, PairParts, ViewDefaults, ViewFiles, hash_pair, is_dicom,
+    FrameChoice, NamedView, Pair, PairParts, ViewDefaults, ViewFiles, is_dicom, pair_files,
     pair_of_views, read_cameras, read_curve, read_grey,
 };
 use ndarray::Array2;
@@ -143,26 +143,25 @@ pub fn pair_of_files(args: &ReconstructArgs) -> Result<(Pair, Vec<PathBuf>), Fai
     }
     let mut sources = Vec::new();
     for path in &args.views.cameras {
-        sources.extend(files_behind(path)?);
+        sources.extend(files_behind(path));
     }
     sources.extend(args.inputs.iter().chain(&args.truth).cloned());
     Ok((pair, sources))
 }
 
 /// The files that cameras named by one path are read from.
-fn files_behind(path: &Path) -> Result<Vec<PathBuf>, Failure> {
+fn files_behind(path: &Path) -> Vec<PathBuf> {
     // COLMAP's two files may be named by their folder or by one of them.
     const COLMAP: [&str; 2] = ["cameras.txt", "images.txt"];
     let is_one = COLMAP.iter().any(|name| path.file_name().is_some_and(|file| file == *name));
     let folder = if is_one { path.parent().unwrap_or(path) } else { path };
     if is_one || folder.join(COLMAP[0]).is_file() {
-        return Ok(COLMAP.map(|name| folder.join(name)).to_vec());
+        return COLMAP.map(|name| folder.join(name)).to_vec();
     }
     if path.is_dir() {
-        let files = hash_pair(path, PairParts::default())?;
-        return Ok(files.into_iter().map(|(file, _)| file).collect());
+        return pair_files(path, PairParts::default());
     }
-    Ok(vec![path.to_owned()])
+    vec![path.to_owned()]
 }
 
 /// How the frames are chosen, for at most two of them.

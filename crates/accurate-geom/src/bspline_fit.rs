@@ -98,8 +98,8 @@ impl<const D: usize> BSpline<D> {
     /// parabolas cost nothing. Knots are equally spaced, one per four points, and closer where that
     /// cannot follow the data. If even the smoothest curve that rounding allows is near enough, it is
     /// the result: a parabola, or beyond about a thousand points a curve of long waves only, nearer than
-    /// was asked for; if the closest possible curve is too far (only where knots as dense as the points cannot follow), that is.
-    /// `sigma = 0` interpolates.
+    /// was asked for; if the closest possible curve is too far (only where knots as dense as the points
+    /// cannot follow), that is. `sigma = 0` interpolates.
     ///
     /// # Errors
     /// As [`interpolate`](Self::interpolate), and [`GeomError::OutOfRange`] for a negative or NaN

@@ -21,12 +21,18 @@ pub fn hash_bytes(bytes: &[u8]) -> String {
     blake3::hash(bytes).to_hex().to_string()
 }
 
-/// The files that [`read_pair`](crate::read_pair) reads with the same `needs`, each with its hash,
-/// so that a result can say what it was made from. Paths are as found from `dir`.
+/// The [`pair_files`], each with its hash, so that a result can say what it was made from.
 ///
 /// # Errors
 /// As [`hash_file`].
 pub fn hash_pair(dir: &Path, needs: PairParts) -> Result<Vec<(PathBuf, String)>, IoError> {
+    let files = pair_files(dir, needs).into_iter();
+    files.map(|file| hash_file(&file).map(|hash| (file, hash))).collect()
+}
+
+/// The files that [`read_pair`](crate::read_pair) reads with the same `needs`, as far as they are there,
+/// in the order of their paths, which are as found from `dir`.
+pub fn pair_files(dir: &Path, needs: PairParts) -> Vec<PathBuf> {
     let mut files = vec![dir.join("meta.json")];
     for (letter, _) in VIEWS {
         files.extend(k_path(dir, letter));
@@ -47,11 +53,8 @@ pub fn hash_pair(dir: &Path, needs: PairParts) -> Result<Vec<(PathBuf, String)>,
     }
     files.sort();
     files.dedup();
+    files.retain(|file| file.is_file());
     files
-        .into_iter()
-        .filter(|file| file.is_file())
-        .map(|file| hash_file(&file).map(|hash| (file, hash)))
-        .collect()
 }
 
 #[cfg(test)]

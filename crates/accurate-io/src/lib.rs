@@ -66,7 +66,7 @@ pub use dicom::{DicomPixels, FrameChoice, read_dicom_pixels, read_dicom_view};
 pub use distortion::{read_distortion, undistort_points};
 pub use error::IoError;
 pub use find::find_pairs;
-pub use fingerprint::{hash_bytes, hash_file, hash_pair};
+pub use fingerprint::{hash_bytes, hash_file, hash_pair, pair_files};
 pub use image_file::{
     BitDepth, GreyImage, MAX_IMAGE_SIDE_PX, png_bytes, read_grey, read_image_size, read_mask,
     write_grey, write_mask, write_rgb, write_u8, write_u16,

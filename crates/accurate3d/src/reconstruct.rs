@@ -236,14 +236,12 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         }
         None => (masks, [0, 0]),
     };
-    let drawn = maps.is_none();
     let robust = params.in_effect();
     robust.validate().map_err(|source| Error::Fitting { case: pair.id.clone(), source })?;
+    let by_grey_levels =
+        maps.is_some() && params.robust.by_grey_levels && params.closure == Closure::Open;
+    let images = pair.images.as_ref().filter(|_| by_grey_levels);
     let maps = maps.filter(|_| params.robust.by_probability);
-    let images = pair
-        .images
-        .as_ref()
-        .filter(|_| !drawn && params.robust.by_grey_levels && params.closure == Closure::Open);
     let result =
         reconstruct_masks(masks, maps, images, &pair.rig, &robust, params.closure, &pair.id)?;
     // The curve was fitted under the corrected camera, if one was asked for.

@@ -15,14 +15,13 @@ use serde_json::{Value, json};
 use crate::args::DoctorArgs;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::make_place;
+use crate::text::{has_extension, make_place};
 use crate::two_views::two_cameras;
 
 /// `accurate camera doctor`: what is wrong with two cameras, by what was seen with them.
 pub fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
     if let Some(path) = &args.out {
-        let extension = path.extension().map(|e| e.to_ascii_lowercase());
-        if !extension.is_some_and(|e| e == "toml" || e == "json") {
+        if !["toml", "json"].iter().any(|extension| has_extension(path, extension)) {
             let message = format!("a rig is written as .toml or .json, not as {}", path.display());
             return Err(Failure::new(Failure::USAGE, message));
         }

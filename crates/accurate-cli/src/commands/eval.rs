@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use crate::args::EvalArgs;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::text::has_extension;
 use crate::two_views::cameras_of;
 use crate::units::common_unit;
 
@@ -62,7 +63,7 @@ fn third_view(
         return Err(Failure::new(Failure::USAGE, message));
     };
     common_unit(("the curve", unit), ("the third view", view.unit))?;
-    let is_csv = seen.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
+    let is_csv = has_extension(seen, "csv");
     let shown: Vec<Point2> = if is_csv {
         let points = read_points::<View1>(seen)?;
         points

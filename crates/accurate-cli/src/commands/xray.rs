@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::args::{XrayArgs, XrayGenerator};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::make_place;
+use crate::text::{has_extension, make_place};
 
 /// Name of the list of a folder of shards.
 const LIST: &str = "shards.json";
@@ -38,7 +38,7 @@ pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
         return Err(Failure::new(Failure::USAGE, "--first plus --count is too large"));
     }
     if let Some(path) = &args.sheet {
-        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        if !has_extension(path, "png") {
             let message = format!("a sheet is written as .png, not as {}", path.display());
             return Err(Failure::new(Failure::USAGE, message));
         }

@@ -14,11 +14,11 @@ const TANGENT_PX: usize = 8;
 
 /// Draws every tip out along its tangent until it is half a thickness from where the mask ends.
 pub(super) fn extend_tips(graph: &mut RoughGraph, radii: &Array2<f64>, mask_thickness_px: f64) {
-    let degree = graph.degrees();
+    let incident = graph.incident();
     for edge in &mut graph.edges {
         for side in 0..2 {
             let node = edge.ends[side];
-            if degree[node] != 1 {
+            if incident[node].len() != 1 {
                 continue;
             }
             if side == 0 {

@@ -57,11 +57,8 @@ impl RoughGraph {
         let spur = params.spur_length_px(mask_thickness_px);
         loop {
             let incident = self.incident();
-            let degree: Vec<usize> = incident.iter().map(Vec::len).collect();
-            // Merging first: it makes edges longer, so that fewer are too short.
-            let merge = (0..self.nodes.len()).find(|&node| {
-                degree[node] == 2 && !self.edges.iter().any(|e| e.ends == [node, node])
-            });
+            // Merging first: it makes edges longer, so that fewer are too short. A loop is no two edges.
+            let merge = incident.iter().position(|edges| matches!(edges[..], [a, b] if a != b));
             let step = merge.map(Step::Merge).or_else(|| self.shortest(&incident, spur, params));
             match step {
                 Some(Step::Drop(edge)) => {
@@ -74,16 +71,8 @@ impl RoughGraph {
         }
     }
 
-    pub fn degrees(&self) -> Vec<usize> {
-        let mut degree = vec![0; self.nodes.len()];
-        for edge in &self.edges {
-            edge.ends.iter().for_each(|&node| degree[node] += 1);
-        }
-        degree
-    }
-
     /// The edges at each node, a loop twice.
-    fn incident(&self) -> Vec<Vec<usize>> {
+    pub fn incident(&self) -> Vec<Vec<usize>> {
         let mut incident = vec![Vec::new(); self.nodes.len()];
         for (index, edge) in self.edges.iter().enumerate() {
             edge.ends.iter().for_each(|&node| incident[node].push(index));
