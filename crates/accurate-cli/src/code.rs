@@ -151,7 +151,9 @@ impl Code {
             Self::NotReproduced => {
                 "`accurate verify` ran a recorded run again and got other bytes. The message names \
                  the files. If the binary's hash differs too, another version made the run; if the \
-                 cases' hash differs, the generator has changed."
+                 cases' hash differs, the generator has changed. On another processor or system \
+                 image rows (a network's sums) and generated cases may differ in their last bits; \
+                 `accurate reproduce table1 --image-cases 0` leaves the images out."
             }
             Self::NoReconstruction => {
                 "The input was read, but no stage could make a curve of it. The message says which \

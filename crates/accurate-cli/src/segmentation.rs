@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use accurate3d::io::read_file;
 use accurate3d::seg::network::{
-    Engine, MAX_MODEL_BYTES, ModelBundle, ModelError, NetworkOptions, NetworkSegmenter, OrtEngine,
-    OrtRuntime, RtenEngine,
+    Engine, MAX_MODEL_BYTES, Mirroring, ModelBundle, ModelError, NetworkOptions, NetworkSegmenter,
+    OrtEngine, OrtRuntime, RtenEngine,
 };
 use accurate3d::seg::{PostProcessing, SegError};
 
-use crate::args::{EngineChoice, ModelArgs};
+use crate::args::{EngineChoice, Mirror, ModelArgs};
 use crate::code::Code;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -41,7 +41,12 @@ pub fn segmenter_with(
 ) -> Result<NetworkSegmenter, Failure> {
     let bundle = bundle(args.model.as_deref())?;
     let engine = engine(args, &bundle, console)?;
-    let options = NetworkOptions { mirror: args.mirror, ..NetworkOptions::DEFAULT };
+    let mirroring = match args.mirror {
+        Mirror::Never => Mirroring::Never,
+        Mirror::Opposite => Mirroring::Opposite,
+        Mirror::All => Mirroring::All,
+    };
+    let options = NetworkOptions { mirroring, ..NetworkOptions::DEFAULT };
     let options = choose(options, bundle.manifest().postprocessing);
     Ok(NetworkSegmenter::new(&bundle, engine, options)?)
 }

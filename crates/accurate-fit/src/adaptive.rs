@@ -133,7 +133,7 @@ fn fit_with_knots(
     let (mut problem, spline) = pose(start, outlines, rig, params.knot_spacing_px)?;
     problem.calibrating = priors.nuisance_weights.is_some();
     let (mut minimiser, steps, converged) = run(problem, spline, params, priors)?;
-    let (more, inverse) = smooth(&mut minimiser, params, adaptive)?;
+    let Smoothed { steps: more, inverse, settings } = smooth(&mut minimiser, params, adaptive)?;
     let variance = adaptive.variance_px2();
     let nuisance = minimiser.current.state.nuisance;
     let nuisance_covariance = if priors.nuisance_weights.is_some() {
@@ -142,41 +142,53 @@ fn fit_with_knots(
     } else {
         Matrix3::zeros()
     };
-    let surprise = surprise(&minimiser, &inverse, params, adaptive);
+    let surprise = surprise(&minimiser, &inverse, &settings, adaptive);
     let fit = finish(minimiser, params, steps + more, converged, Some((&inverse, variance)))?;
     let fit = OutlineFit { surprise: Some(surprise), ..fit };
     Ok(Posterior { fit, nuisance, nuisance_covariance })
 }
 
-/// [`OutlineFit::surprise`] at the current curve, which is smoothed and judged.
+/// [`OutlineFit::surprise`] at the current curve, which is smoothed under `settings` and judged.
 fn surprise(
     minimiser: &Minimiser<'_>,
     inverse: &SelectedInverse,
-    params: &OutlineFitParams,
+    settings: &Settings,
     adaptive: &AdaptiveParams,
 ) -> f64 {
     let Minimiser { problem, current, .. } = minimiser;
     let spline = &current.state.spline;
-    let settings = final_settings(params, &SmoothnessScale::new(spline, problem.px_per_unit));
     let variance = adaptive.variance_px2();
     // A boundary point that is no datum counts as one of the size of the noise, or leaving points out
     // would pay.
     let points = problem.outlines.iter().map(|outline| outline.points.len()).sum::<usize>();
     let used = current.rows.iter().filter(|row| row.held && !row.outside).count();
     let unused = points.saturating_sub(used) as f64 / adaptive.noise_inflation;
-    let cost = problem.cost(current, &settings) + minimiser.prior_cost(current);
+    let cost = problem.cost(current, settings) + minimiser.prior_cost(current);
     let factors = &problem.local_smoothness;
     let unknowns = 3 * spline.control.len();
-    cost / variance + unused + occam(inverse, unknowns, variance, settings.lambda3, factors)
+    // What no third difference holds is where the curve begins, in which direction and how bent: nine
+    // unknowns of the body, spread evenly, whatever the distance h of the knots. In the first control
+    // points, whose differences are h and h² times those, their density is that of h^-9.
+    let spacing_px = spline.length(8) * problem.px_per_unit / spline.spans() as f64;
+    let free = 18.0 * spacing_px.ln();
+    cost / variance + unused + free + occam(inverse, unknowns, variance, settings.lambda3, factors)
 }
 
-/// Alternates smoothness and curve; returns the steps taken and the inverse of the final normal
-/// matrix.
+/// What [`smooth`] did.
+pub(crate) struct Smoothed {
+    pub(crate) steps: usize,
+    /// Of the final normal matrix ...
+    pub(crate) inverse: SelectedInverse,
+    /// ... and what it was assembled under.
+    settings: Settings,
+}
+
+/// Alternates smoothness and curve.
 pub(crate) fn smooth(
     minimiser: &mut Minimiser<'_>,
     params: &OutlineFitParams,
     adaptive: &AdaptiveParams,
-) -> Result<(usize, SelectedInverse), FitError> {
+) -> Result<Smoothed, FitError> {
     let spline = &minimiser.current.state.spline;
     let scale = SmoothnessScale::new(spline, minimiser.problem.px_per_unit);
     let settings = final_settings(params, &scale);
@@ -194,7 +206,7 @@ pub(crate) fn smooth(
         steps += alternate(minimiser, &settings, adaptive, allowed)?;
     }
     let inverse = inverse(minimiser, &settings)?;
-    Ok((steps, inverse))
+    Ok(Smoothed { steps, inverse, settings })
 }
 
 /// Steps of smoothness and curve from equal smoothness, until the former changes no more. If they are

@@ -1,4 +1,10 @@
 //! One 3D B-spline fitted to both views: to two outlines, two ordered curves, or two pictures.
+//!
+//! Curves and their covariances are in the world frame and unit of the [`Rig`](accurate_geom::Rig) (the
+//! covariance in its square). Lengths in images, residuals and knot spacings are in px, misfits in px².
+//! Input that shows no curve (too few points, numbers that are not finite, a match that is no basis for
+//! a fit) is an [`FitError`] with the values; a curve that explains its data badly is no error and is
+//! told by its [`Judgement`].
 
 mod adaptive;
 mod boundary_fit;

@@ -5,7 +5,7 @@ use crate::selected_inverse::SelectedInverse;
 /// residual's `variance`, for so many `unknowns` of which the data or a prior speak in these units (others
 /// add the same to every fit), `factors` the smoothness of every knot span in units of `lambda3`.
 ///
-/// What the prior leaves open (9 unknowns) is the same in every fit.
+/// What the prior leaves open (9 unknowns) is the same in fits with knots as far apart.
 pub(crate) fn occam(
     inverse: &SelectedInverse,
     unknowns: usize,

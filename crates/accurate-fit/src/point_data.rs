@@ -80,11 +80,14 @@ pub(crate) fn matched(
         covered(pairs.iter().map(|p| p.0), n1, params.free_ends[0]),
         covered(pairs.iter().map(|p| p.1), n2, params.free_ends[1]),
     );
+    // A calibration that is still to be found moves all points of a view off their lines.
+    let off_px = params.calibration.map_or(0.0, |priors| 3.0 * priors.shift_sigma_px);
+    let max_distance_px = params.max_mean_distance_px + off_px;
     // The comparisons are false for NaN, too.
-    if !(mean_distance_px <= params.max_mean_distance_px && coverage >= params.min_coverage) {
+    if !(mean_distance_px <= max_distance_px && coverage >= params.min_coverage) {
         return Err(FitError::BadMatch {
             mean_distance_px,
-            max_distance_px: params.max_mean_distance_px,
+            max_distance_px,
             coverage,
             min_coverage: params.min_coverage,
         });

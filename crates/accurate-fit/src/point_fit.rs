@@ -39,7 +39,8 @@ pub struct PointFitParams {
     pub first_steps: usize,
     /// Most updates of noise and smoothness.
     pub rounds: usize,
-    /// A match whose pairs are farther apart on average is refused, px.
+    /// A match whose pairs are farther apart on average is refused, px; with a calibration to be found,
+    /// farther by three standard deviations of its shift.
     pub max_mean_distance_px: f64,
     /// A match that leaves more than this of a curve without partner is refused.
     pub min_coverage: f64,

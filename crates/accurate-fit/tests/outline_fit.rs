@@ -180,8 +180,9 @@ fn a_curve_that_cannot_follow_the_outlines_is_more_surprising_in_every_frame() {
     let [close, wider, far] = [8.0, 12.0, 60.0].map(|px| surprise(&truth, &pair, rig, px));
     assert!(far - close > 6.0 * 10.0, "{close} {far}");
     // Knots that suffice are as likely as more of them, up to what the estimate of the smoothness
-    // leaves open.
-    assert!((close - wider).abs() < 0.2 * (far - close), "{close} {wider} {far}");
+    // leaves open (some 5); a density of the nine free unknowns that does not follow the knots would
+    // add 18 ln(12 / 8), 7 to that.
+    assert!((close - wider).abs() < 8.0, "{close} {wider} {far}");
 
     // Another unit adds the same to all.
     let scaled = |rig: &Rig, scale: f64| {

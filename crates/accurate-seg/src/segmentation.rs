@@ -29,6 +29,12 @@ pub trait Segmenter: fmt::Debug + Send + Sync {
     /// implementation itself refuses.
     fn segment(&self, image: &Array2<f32>, watch: &Watch<'_>) -> Result<Segmentation, SegError>;
 
+    /// The same with more care, at several times the cost: what is asked where a result is in doubt.
+    /// `None` where there is no such way, or where it is the one that is always gone.
+    fn careful(&self) -> Option<Box<dyn Segmenter + '_>> {
+        None
+    }
+
     /// What segments, for a report: model, engine and settings in one line.
     fn describe(&self) -> String;
 }

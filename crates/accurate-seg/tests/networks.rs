@@ -9,8 +9,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use accurate_seg::network::{
-    Engine, Manifest, ModelBundle, ModelError, NetworkOptions, NetworkSegmenter, OrtEngine,
-    OrtRuntime, Polarity, RtenEngine,
+    Engine, Manifest, Mirroring, ModelBundle, ModelError, NetworkOptions, NetworkSegmenter,
+    OrtEngine, OrtRuntime, Polarity, RtenEngine,
 };
 use accurate_seg::{Mask, PostProcessing, SegError, Segmenter, unwatched};
 use ndarray::Array2;
@@ -94,8 +94,8 @@ fn windows_give_what_the_whole_image_gives_for_a_network_without_surroundings() 
     let whole = segmenter(&bundle(DARK, |_| {}), 1, NetworkOptions::DEFAULT)
         .probability(&image, &unwatched);
     let cut = bundle(DARK, |m| m.tiling.whole_up_to_px = 0);
-    for mirror in [false, true] {
-        let options = NetworkOptions { mirror, ..NetworkOptions::DEFAULT };
+    for mirroring in [Mirroring::Never, Mirroring::Opposite, Mirroring::All] {
+        let options = NetworkOptions { mirroring, ..NetworkOptions::DEFAULT };
         let windows = segmenter(&cut, 1, options).probability(&image, &unwatched).unwrap();
         for (a, b) in whole.as_ref().unwrap().iter().zip(&windows) {
             // A weighted mean of up to nine windows by four mirror images, all equal to rounding.
@@ -108,34 +108,58 @@ fn windows_give_what_the_whole_image_gives_for_a_network_without_surroundings() 
 fn mirroring_makes_the_answer_to_a_mirrored_image_the_mirrored_answer() {
     let image = picture(48, 64);
     let bundle = bundle(UNET, |_| {});
-    let plain = segmenter(&bundle, 1, NetworkOptions::DEFAULT);
-    let both = NetworkOptions { mirror: true, ..NetworkOptions::DEFAULT };
-    let mirrored = segmenter(&bundle, 1, both);
-    let flip = |a: &Array2<f32>| {
+    let flip = |a: &Array2<f32>, axes: &[usize]| {
         let mut view = a.view();
-        view.invert_axis(ndarray::Axis(1));
+        axes.iter().for_each(|axis| view.invert_axis(ndarray::Axis(*axis)));
         view.as_standard_layout().into_owned()
     };
-    let difference = |s: &NetworkSegmenter| {
+    let difference = |mirroring: Mirroring, axes: &[usize]| {
+        let options = NetworkOptions { mirroring, ..NetworkOptions::DEFAULT };
+        let s = segmenter(&bundle, 1, options);
         let straight = s.probability(&image, &unwatched).unwrap();
-        let turned = flip(&s.probability(&flip(&image), &unwatched).unwrap());
+        let turned = flip(&s.probability(&flip(&image, axes), &unwatched).unwrap(), axes);
         straight.iter().zip(&turned).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
     };
-    // Four means in another order; the normalisation's sum runs in another order too.
-    assert!(difference(&mirrored) < 1e-4, "{}", difference(&mirrored));
-    assert!(difference(&plain) > 1e-2, "the network has no preferred side: {}", difference(&plain));
+    // Means in another order; the normalisation's sum runs in another order too.
+    let both = [0, 1];
+    let same = [
+        difference(Mirroring::All, &both[1..]),
+        difference(Mirroring::All, &both),
+        difference(Mirroring::Opposite, &both),
+    ];
+    assert!(same.iter().all(|d| *d < 1e-4), "{same:?}");
+    // The network has a preferred side.
+    let other = [difference(Mirroring::Never, &both), difference(Mirroring::Opposite, &both[1..])];
+    assert!(other.iter().all(|d| *d > 1e-2), "{other:?}");
+}
+
+/// What is done where a result is in doubt, unless it is done anyway.
+#[test]
+fn more_care_is_all_mirror_images() {
+    let image = picture(48, 64);
+    let with = |mirroring, bundle: &ModelBundle| {
+        segmenter(bundle, 1, NetworkOptions { mirroring, ..NetworkOptions::DEFAULT })
+    };
+    let mirrored = bundle(UNET, |_| {});
+    let (some, all) = (with(Mirroring::Opposite, &mirrored), with(Mirroring::All, &mirrored));
+    let careful = some.careful().expect("a more careful way");
+    let [a, b] = [careful.segment(&image, &unwatched), all.segment(&image, &unwatched)];
+    assert_eq!(a.unwrap(), b.unwrap());
+    assert_eq!(careful.describe(), all.describe());
+    assert!(all.careful().is_none());
+    let one_way = bundle(UNET, |m| m.mirror_axes.clear());
+    assert!(with(Mirroring::Opposite, &one_way).careful().is_none());
 }
 
 #[test]
 fn the_bytes_are_the_same_for_any_number_of_threads() {
     let image = picture(200, 264);
+    // The mean of several is all above one half.
+    let options = NetworkOptions { mirroring: Mirroring::Never, ..NetworkOptions::DEFAULT };
     for network in [UNET, DARK] {
         let bundle = bundle(network, |_| {});
-        let of = |threads| {
-            segmenter(&bundle, threads, NetworkOptions::DEFAULT)
-                .probability(&image, &unwatched)
-                .unwrap()
-        };
+        let of =
+            |threads| segmenter(&bundle, threads, options).probability(&image, &unwatched).unwrap();
         let one = of(1);
         assert!(one.iter().any(|p| *p > 0.5) && one.iter().any(|p| *p < 0.5));
         for threads in [2, 3, 8] {
@@ -144,7 +168,7 @@ fn the_bytes_are_the_same_for_any_number_of_threads() {
         let Some(runtime) = runtime() else { continue };
         let of = |threads| {
             let engine = Box::new(OrtEngine::new(&runtime, &bundle, threads).unwrap());
-            NetworkSegmenter::new(&bundle, engine, NetworkOptions::DEFAULT)
+            NetworkSegmenter::new(&bundle, engine, options)
                 .unwrap()
                 .probability(&image, &unwatched)
                 .unwrap()

@@ -5,14 +5,18 @@ use accurate_fit::{CalibrationEstimate, FitError, PointFit};
 use accurate_match::{CurveReconstruction, FreeMatch};
 use serde::Serialize;
 
-use crate::Traces;
 use crate::robust::{Evidence, JointResult, Suspicion};
+use crate::{CarefulLook, Traces};
 
 /// How far a reconstruction can be trusted, without knowing the truth.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnostics {
     /// Mean distance in view 1 of matched pixels to their epipolar lines, px. Right orders stay
-    /// below about 0.5; a wrong traversal or direction shows as more.
+    /// below about 0.5; a wrong traversal or direction shows as more. By [`Method::Accurate`] on masks
+    /// and images it is that of the two walks that the curve started from: the fitted curve's own is 0,
+    /// for its pixels are projections of one point.
+    ///
+    /// [`Method::Accurate`]: crate::Method::Accurate
     pub mean_epipolar_distance_px: f64,
     /// The largest such distance of a matched pair, px; none where the points are those of a fitted
     /// curve, whose projections always meet.
@@ -48,6 +52,8 @@ pub struct Diagnostics {
     pub direction_margin_px: Option<f64>,
     /// Whether the curve is closed; its last point then repeats its first.
     pub closed: bool,
+    /// What came of a careful second look at the images, if there was one.
+    pub careful_look: Option<CarefulLook>,
 }
 
 /// How well an adjusted curve explains the ordered points of both views.
@@ -123,9 +129,17 @@ impl From<&CalibrationEstimate> for CalibrationDiagnostics {
 /// How well a fitted curve explains the outlines of both masks.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OutlineDiagnostics {
-    /// Outline that the curve does not explain; 0 at the truth.
+    /// Outline that the curve does not explain, as [`Judgement::unexplained`]: the misfit of every
+    /// boundary point of both views beyond 0.8 px, at most 4 px, summed and divided by 10 px. 0 at the
+    /// truth; no fraction, as it grows with the length of what is not explained.
+    ///
+    /// [`Judgement::unexplained`]: accurate_fit::Judgement::unexplained
     pub unexplained: f64,
-    /// Curve that the masks do not show; 0 at the truth.
+    /// Curve that the masks do not show, as [`Judgement::outside`]: its distance from them beyond 1 px,
+    /// at most 4 px, summed over both images in steps of 1 px and divided by 10 px. 0 at the truth; no
+    /// fraction either.
+    ///
+    /// [`Judgement::outside`]: accurate_fit::Judgement::outside
     pub outside: f64,
     /// Mean squared residual of the boundary points, px²; 1/18 at the truth.
     pub chi_per_point: f64,
@@ -189,6 +203,7 @@ impl Diagnostics {
             points_fit: None,
             direction_margin_px: None,
             closed: false,
+            careful_look: None,
         }
     }
 
@@ -227,6 +242,7 @@ impl Diagnostics {
             // Infinite if the other direction is impossible.
             direction_margin_px: matched.margin_px.filter(|margin| margin.is_finite()),
             closed: false,
+            careful_look: None,
         }
     }
 
@@ -265,6 +281,7 @@ impl Diagnostics {
             points_fit: None,
             direction_margin_px: None,
             closed: false,
+            careful_look: None,
         }
     }
 }

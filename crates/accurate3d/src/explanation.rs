@@ -23,9 +23,15 @@ pub struct ConsideredCurve {
     pub score: f64,
     /// What the choice compares among those; the least wins. On the scale of the score.
     pub unlikeliness: Option<f64>,
-    /// Outline that the curve does not explain, cut faces aside; 0 at the truth.
+    /// Outline that the curve does not explain, cut faces aside; 0 at the truth. No fraction: it is
+    /// summed along the outlines, as [`OutlineDiagnostics::unexplained`].
+    ///
+    /// [`OutlineDiagnostics::unexplained`]: crate::OutlineDiagnostics::unexplained
     pub unexplained: f64,
-    /// Curve that the masks do not show; 0 at the truth.
+    /// Curve that the masks do not show; 0 at the truth. Summed along the curve, as
+    /// [`OutlineDiagnostics::outside`].
+    ///
+    /// [`OutlineDiagnostics::outside`]: crate::OutlineDiagnostics::outside
     pub outside: f64,
     /// Mean squared residual of the boundary points, px²; 1/18 at the truth.
     pub chi_per_point: f64,

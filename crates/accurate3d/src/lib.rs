@@ -5,6 +5,31 @@
 //! and returns a [`Reconstruction`]: the 3D curve with the pixels it came from and diagnostics.
 //! The stages meet only here; each is a crate of its own and is re-exported as a module:
 //! [`geom`], [`seg`], [`traverse`], [`matching`], [`fit`], [`baselines`], [`eval`], [`synth`], [`io`].
+//! [`doctor`] looks for mistakes in cameras, [`plan`] for the second view that sees a shape best,
+//! [`table`] measures sets of cases.
+//!
+//! ```no_run
+//! use accurate3d::{InputKind, Method, Params, ViewPair, io, reconstruct};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let rig = io::read_rig("rig.toml".as_ref())?;
+//! let masks = [io::read_mask("a_mask.png".as_ref())?, io::read_mask("b_mask.png".as_ref())?];
+//! let pair = ViewPair { masks: Some(masks), ..ViewPair::new("case_017", rig) };
+//! let curve = reconstruct(&pair, &Params::new(InputKind::Mask, Method::Accurate))?;
+//! for doubt in &curve.diagnostics.suspicions {
+//!     println!("{}: {doubt}", curve.id);
+//! }
+//! io::write_curve("wire.vtp".as_ref(), &curve.curve_table())?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Masks and images are [`ndarray`] arrays (version 0.17) of shape (height, width), `[[y, x]]`. Pixel
+//! centres lie at integers, x to the right, y down; positions are in the rig's unit.
+//!
+//! Features, none of them on by default: `rten` and `ort` run segmentation networks
+//! ([`segment_images`]), `dicom` reads DICOM XA, `parquet` writes curves as Parquet. No network is built
+//! in: that of the command line is the file `models/wire.accmodel` of the repository.
 //!
 //! Research software: not for clinical use.
 
@@ -19,6 +44,7 @@ pub use accurate_synth as synth;
 pub use accurate_traverse as traverse;
 
 mod c_arm;
+mod careful_look;
 mod diagnostics;
 mod direction;
 pub mod doctor;
@@ -39,6 +65,7 @@ mod segment;
 pub mod table;
 mod unrolled;
 
+pub use careful_look::{CarefulLook, reconstruct_images};
 pub use diagnostics::{
     CalibrationDiagnostics, Diagnostics, IntensityDiagnostics, OutlineDiagnostics,
     PointsDiagnostics,

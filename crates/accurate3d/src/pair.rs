@@ -5,8 +5,9 @@ use ndarray::Array2;
 
 /// Two calibrated views of one thin body: what [`reconstruct`](crate::reconstruct) reads.
 ///
-/// Only what the chosen input needs has to be there. Images and masks have shape (height, width);
-/// points are undistorted pixels in order along the body.
+/// Only what the chosen input needs has to be there. Images and masks have shape (height, width), the
+/// size of their camera's image ([`Error::OtherSize`](crate::Error::OtherSize) otherwise); points are
+/// undistorted pixels in order along the body.
 #[derive(Debug, Clone)]
 pub struct ViewPair {
     /// Name of the case, used in messages and results.
@@ -17,7 +18,8 @@ pub struct ViewPair {
     pub points: Option<OrderedPoints>,
     /// Binary masks of both views.
     pub masks: Option<[Array2<bool>; 2]>,
-    /// Grey images of both views, raw values.
+    /// Grey images of both views, raw values. The body is taken to be darker than what surrounds it:
+    /// invert others first.
     pub images: Option<[Array2<f32>; 2]>,
     /// Probability of the body in both images, 0 to 1, where they were segmented
     /// ([`segment_images`](crate::segment_images)); the masks are then what was made of it.

@@ -72,7 +72,8 @@ impl fmt::Display for Closure {
 }
 
 impl Params {
-    /// The published parameters for an input and a method.
+    /// The defaults for an input and a method: the published parameters of the traversal,
+    /// [`RobustParams::DEFAULT`] for our own method, and a body with two ends.
     pub const fn new(input: InputKind, method: Method) -> Self {
         Self {
             input,
@@ -84,6 +85,11 @@ impl Params {
     }
 }
 
+/// On images, where nothing but the search itself proposes curves, the first good one is less often the
+/// right one: so many are fitted, and others unless they are so far behind.
+const IMAGES_MIN_FITS: usize = 6;
+const IMAGES_CLEAR_LEAD: f64 = 4.0;
+
 impl Params {
     /// What the joint choice goes by: on what a network found, not everything that masks allow.
     fn in_effect(&self) -> RobustParams {
@@ -91,6 +97,8 @@ impl Params {
         RobustParams {
             exchange: self.robust.exchange && drawn,
             turned: self.robust.turned && drawn,
+            min_fits: self.robust.min_fits.max(if drawn { 1 } else { IMAGES_MIN_FITS }),
+            clear_lead: self.robust.clear_lead.max(if drawn { 0.0 } else { IMAGES_CLEAR_LEAD }),
             ..self.robust
         }
     }

@@ -17,7 +17,7 @@ pub use self::camera::{
 pub use self::figure::{DemoArgs, FigureArgs};
 pub use self::reconstruct::{Extra, ReconstructArgs, TraceArgs};
 pub use self::segment::{
-    EngineChoice, ImportArgs, ModelArgs, ModelCommand, Photometric, SegmentArgs,
+    EngineChoice, ImportArgs, Mirror, ModelArgs, ModelCommand, Photometric, SegmentArgs,
 };
 pub use self::synth::{
     CasesArgs, Disturbances, PointsKind, SynthArgs, SynthCommand, XrayArgs, XrayGenerator,
@@ -79,7 +79,7 @@ Examples:
   accurate camera doctor a.dcm b.dcm --masks a.png b.png
   accurate explain A021                                what an error means
 
-Exit codes: 0 done; 1 internal error; 2 wrong usage; 3 no reconstruction found;
+Exit codes: 0 done; 1 internal error, or a check (table --check, verify) that failed; 2 wrong usage; 3 no reconstruction found;
 4 suspect result (--strict); 65 bad input; 66 input missing; 69 a needed part is not installed; 74 a file could not be read or written.";
 
 #[derive(Debug, Subcommand)]

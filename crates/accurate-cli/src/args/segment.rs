@@ -14,9 +14,20 @@ pub struct ModelArgs {
     /// Library of ONNX Runtime, libonnxruntime.so.* (default: the variable ORT_DYLIB_PATH).
     #[arg(long, value_name = "LIBRARY")]
     pub onnxruntime: Option<PathBuf>,
-    /// Let the network see the mirrored images as well: steadier, up to four times the time.
-    #[arg(long)]
-    pub mirror: bool,
+    /// Which mirror images of an image the network sees as well.
+    #[arg(long, value_enum, default_value_t = Mirror::Opposite)]
+    pub mirror: Mirror,
+}
+
+/// Mirror images that probabilities are averaged over; the more, the steadier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Mirror {
+    /// None.
+    Never,
+    /// That along both axes, a half turn: twice the time.
+    Opposite,
+    /// All: four times the time.
+    All,
 }
 
 /// What runs a network.

@@ -7,7 +7,7 @@ use accurate3d::seg::network::NetworkSegmenter;
 use accurate3d::seg::{Segmenter, unwatched};
 use accurate3d::{
     Closure, InputKind, Method, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair,
-    reconstruct, segment_images,
+    reconstruct, reconstruct_images, segment_images,
 };
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -244,7 +244,11 @@ fn one(
     let mut params = Params::new(args.input, args.method);
     params.robust.calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
     params.closure = args.closed;
-    let reconstruction = reconstruct(&pair, &params)?;
+    let (reconstruction, seen) = match segmenter {
+        Some(segmenter) => reconstruct_images(&pair, &params, segmenter, &unwatched)?,
+        None => (reconstruct(&pair, &params)?, None),
+    };
+    let pair = seen.unwrap_or(pair);
     let mut result = result_json(&shown, inputs, &pair, &params, &reconstruction)?;
     if let Some(segmenter) = segmenter {
         result["parameters"]["segmentation"] = Value::from(segmenter.describe());

@@ -229,7 +229,7 @@ fn nnunet_results_become_a_model_that_runs() {
     let pair = pair_of_shadows("bend", dir.path());
     let mut segment = accurate();
     segment
-        .args(["segment", "--mirror", "--model"])
+        .args(["segment", "--mirror", "all", "--model"])
         .arg(&model)
         .arg("-o")
         .arg(dir.path().join("out"));

@@ -35,4 +35,4 @@ pub use onnx_check::NetworkFacts;
 pub use ort_engine::{OrtEngine, OrtRuntime};
 #[cfg(feature = "rten")]
 pub use rten_engine::RtenEngine;
-pub use segmenter::{NetworkOptions, NetworkSegmenter};
+pub use segmenter::{Mirroring, NetworkOptions, NetworkSegmenter};

@@ -12,22 +12,34 @@ use crate::{Mask, PostProcessing, Progress, SegError, Segmentation, Segmenter, W
 pub struct NetworkOptions {
     /// Whether the body is the darker or the brighter.
     pub polarity: Polarity,
-    /// Average over the mirror images along the model's axes: steadier, 2 or 4 times the time.
-    pub mirror: bool,
+    /// Over which mirror images probabilities are averaged.
+    pub mirroring: Mirroring,
     /// From probabilities to a mask; `None` takes the model's own.
     pub postprocessing: Option<PostProcessing>,
 }
 
 impl NetworkOptions {
-    /// The body dark, no mirroring, the model's own post-processing.
+    /// The body dark, looked at from both sides, the model's own post-processing.
     pub const DEFAULT: Self =
-        Self { polarity: Polarity::BodyDark, mirror: false, postprocessing: None };
+        Self { polarity: Polarity::BodyDark, mirroring: Mirroring::Opposite, postprocessing: None };
 }
 
 impl Default for NetworkOptions {
     fn default() -> Self {
         Self::DEFAULT
     }
+}
+
+/// Over which mirror images, along the axes that the model was trained with, probabilities are
+/// averaged. What breaks in one image seldom breaks in all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mirroring {
+    /// The image as it is.
+    Never,
+    /// And mirrored along all axes at once, a half turn: twice the time.
+    Opposite,
+    /// All mirror images: with two axes four times the time.
+    All,
 }
 
 /// A network with an engine, ready to segment images of any size.
@@ -77,6 +89,16 @@ impl NetworkSegmenter {
         image: &Array2<f32>,
         watch: &Watch<'_>,
     ) -> Result<Array2<f32>, SegError> {
+        self.seen(image, self.options.mirroring, watch)
+    }
+
+    /// The probability, averaged over mirror images.
+    fn seen(
+        &self,
+        image: &Array2<f32>,
+        mirroring: Mirroring,
+        watch: &Watch<'_>,
+    ) -> Result<Array2<f32>, SegError> {
         let (height, width) = image.dim();
         if (height as u64).saturating_mul(width as u64) > MAX_IMAGE_PX {
             return Err(SegError::TooLarge { height, width });
@@ -92,7 +114,8 @@ impl NetworkSegmenter {
         };
         let sides = [padded[0].max(window[0]), padded[1].max(window[1])];
         let padded = extend_to(&image, sides);
-        let probability = self.in_windows(&padded.image, window, watch)?;
+        let mirrors = self.mirrors(mirroring);
+        let probability = self.in_windows(&padded.image, window, &mirrors, watch)?;
         let [top, left] = padded.before;
         Ok(Array2::from_shape_fn((height, width), |(row, col)| {
             probability[[top + row, left + col]]
@@ -103,11 +126,11 @@ impl NetworkSegmenter {
         &self,
         image: &Array2<f32>,
         window: [usize; 2],
+        mirrors: &[[bool; 2]],
         watch: &Watch<'_>,
     ) -> Result<Array2<f32>, SegError> {
         let (height, width) = image.dim();
         let (rows, columns) = (starts(height, window[0]), starts(width, window[1]));
-        let mirrors = self.mirrors();
         let total = rows.len() * columns.len() * mirrors.len();
         let weights = window_weights(window);
         let mut sum = Array2::<f32>::zeros((height, width));
@@ -117,7 +140,7 @@ impl NetworkSegmenter {
             let shape = (window[0], window[1]);
             let cut = Array2::from_shape_fn(shape, |(r, c)| image[[top + r, left + c]]);
             let mut mean = Array2::<f32>::zeros(shape);
-            for &axes in &mirrors {
+            for &axes in mirrors {
                 if watch(Progress { done, total }) == ControlFlow::Break(()) {
                     return Err(SegError::Cancelled { done, total });
                 }
@@ -144,13 +167,40 @@ impl NetworkSegmenter {
     }
 
     /// Axes to reverse, for each image that the network sees.
-    fn mirrors(&self) -> Vec<[bool; 2]> {
-        let along = |axis: u8| self.options.mirror && self.manifest.mirror_axes.contains(&axis);
-        let choices = |mirrored: bool| if mirrored { vec![false, true] } else { vec![false] };
-        choices(along(0))
-            .into_iter()
-            .flat_map(|rows| choices(along(1)).into_iter().map(move |columns| [rows, columns]))
-            .collect()
+    fn mirrors(&self, mirroring: Mirroring) -> Vec<[bool; 2]> {
+        let axes = [0, 1].map(|axis: u8| self.manifest.mirror_axes.contains(&axis));
+        let all = [[false; 2], axes, [axes[0], false], [false, axes[1]]];
+        let mut mirrors = match mirroring {
+            Mirroring::Never => all[..1].to_vec(),
+            Mirroring::Opposite => all[..2].to_vec(),
+            Mirroring::All => all.to_vec(),
+        };
+        mirrors.sort_unstable();
+        mirrors.dedup();
+        mirrors
+    }
+
+    fn segmentation(
+        &self,
+        image: &Array2<f32>,
+        mirroring: Mirroring,
+        watch: &Watch<'_>,
+    ) -> Result<Segmentation, SegError> {
+        let probability = self.seen(image, mirroring, watch)?;
+        let post = self.options.postprocessing.unwrap_or(self.manifest.postprocessing);
+        let mask: Mask = post.mask_of(&probability)?;
+        Ok(Segmentation { probability, mask })
+    }
+
+    fn described(&self, mirroring: Mirroring) -> String {
+        format!(
+            "{} (BLAKE3 {}) by {}, images of each: {}, {:?}",
+            self.manifest.name,
+            self.hash,
+            self.engine.describe(),
+            self.mirrors(mirroring).len(),
+            self.options.postprocessing.unwrap_or(self.manifest.postprocessing)
+        )
     }
 
     /// Softmax, summed over the foreground.
@@ -186,21 +236,31 @@ impl NetworkSegmenter {
 
 impl Segmenter for NetworkSegmenter {
     fn segment(&self, image: &Array2<f32>, watch: &Watch<'_>) -> Result<Segmentation, SegError> {
-        let probability = self.probability(image, watch)?;
-        let post = self.options.postprocessing.unwrap_or(self.manifest.postprocessing);
-        let mask: Mask = post.mask_of(&probability)?;
-        Ok(Segmentation { probability, mask })
+        self.segmentation(image, self.options.mirroring, watch)
+    }
+
+    /// The average over all mirror images, where it is not asked for anyway.
+    fn careful(&self) -> Option<Box<dyn Segmenter + '_>> {
+        let is_other = self.mirrors(Mirroring::All) != self.mirrors(self.options.mirroring);
+        is_other.then(|| Box::new(Mirrored(self)) as _)
     }
 
     fn describe(&self) -> String {
-        format!(
-            "{} (BLAKE3 {}) by {}, mirrored: {}, {:?}",
-            self.manifest.name,
-            self.hash,
-            self.engine.describe(),
-            self.options.mirror && !self.manifest.mirror_axes.is_empty(),
-            self.options.postprocessing.unwrap_or(self.manifest.postprocessing)
-        )
+        self.described(self.options.mirroring)
+    }
+}
+
+/// A [`NetworkSegmenter`] that averages over all mirror images.
+#[derive(Debug)]
+struct Mirrored<'a>(&'a NetworkSegmenter);
+
+impl Segmenter for Mirrored<'_> {
+    fn segment(&self, image: &Array2<f32>, watch: &Watch<'_>) -> Result<Segmentation, SegError> {
+        self.0.segmentation(image, Mirroring::All, watch)
+    }
+
+    fn describe(&self) -> String {
+        self.0.described(Mirroring::All)
     }
 }
 

@@ -60,19 +60,20 @@ pub(super) fn stretch<V: View>(
     mask_thickness_px: f64,
 ) {
     let reach = mask_thickness_px + 0.5;
-    for piece in far_pieces(edges, radii, reach) {
+    'pieces: for piece in far_pieces(edges, radii, reach) {
         // The farthest pixel of the piece and what it is nearest to.
         let mut target: Option<(f64, Point2, usize, usize)> = None;
         for at in piece {
             let Some((distance, edge, index)) = nearest(edges, at) else { continue };
+            // Not of this body; a large one would take minutes.
+            if distance > MAX_STRETCH_PX {
+                continue 'pieces;
+            }
             if target.is_none_or(|(farthest, ..)| distance > farthest) {
                 target = Some((distance, at, edge, index));
             }
         }
         let Some((distance, pixel, edge, index)) = target else { continue };
-        if distance > MAX_STRETCH_PX {
-            continue;
-        }
         let line = &mut edges[edge];
         let last = line.points.len() - 1;
         let from = line.points[index].point();

@@ -61,8 +61,8 @@ pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Recons
 }
 
 /// What was found under the given calibration and the rig that it holds under: if the fit estimates
-/// another calibration, it is found once more under that. What is estimated stays relative to the
-/// given one.
+/// another calibration, it is found once more under that, unless nothing can be fitted there. What is
+/// estimated stays relative to the given one.
 fn under_better_calibration<T, E>(
     given: &Rig,
     found_under: impl Fn(&Rig) -> Result<T, E>,
@@ -70,14 +70,12 @@ fn under_better_calibration<T, E>(
 ) -> Result<(T, Rig), E> {
     let corrected = |found: &T| fit(found)?.calibration?.correct(given).ok();
     let found = found_under(given)?;
-    match corrected(&found) {
-        Some(better) => {
-            let found = found_under(&better)?;
-            let rig = corrected(&found).unwrap_or_else(|| given.clone());
-            Ok((found, rig))
-        }
-        None => Ok((found, given.clone())),
-    }
+    let Some(better) = corrected(&found) else { return Ok((found, given.clone())) };
+    let again = found_under(&better)?;
+    Ok(match corrected(&again) {
+        Some(rig) => (again, rig),
+        None => (found, better),
+    })
 }
 
 /// A match and the likeliest fit that starts from it.

@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use accurate_fit::Outline;
 use accurate_geom::{Pixel, View};
 use accurate_match::{FreeEnds, SignalCurve};
@@ -57,18 +59,19 @@ impl<V: View> ViewCandidates<V> {
             Some(map) => gap_hints(map, &whole, &GapParams::DEFAULT).map_err(segmentation)?,
             None => Vec::new(),
         };
-        let (mut cut, origin) = cut_to_body(array);
+        let mut shown = Cow::Borrowed(array);
+        if !hints.is_empty() {
+            // The graph alone walks over hints; the fit judges by what the map shows.
+            let half_px = 0.5 * median_width_px(&whole).map_err(segmentation)?;
+            let drawn = shown.to_mut();
+            hints.iter().for_each(|hint| draw(drawn, hint, half_px));
+        }
+        let (cut, origin) = cut_to_body(&shown);
         // However a mask lies, the same skeleton is taken of it. (A network sees another image.)
         let upright = if probability.is_none() { Turn::upright(&cut) } else { Turn::NONE };
         let turn = upright.then(turn);
         let frame = Frame::new(turn, origin, &cut);
-        let mut mask = Mask::from_array(turn.array(&cut)).map_err(segmentation)?;
-        if !hints.is_empty() {
-            // The graph alone walks over hints; the fit judges by what the map shows.
-            let half_px = 0.5 * median_width_px(&mask).map_err(segmentation)?;
-            hints.iter().for_each(|hint| draw(&mut cut, hint, origin, half_px));
-            mask = Mask::from_array(turn.array(&cut)).map_err(segmentation)?;
-        }
+        let mask = Mask::from_array(turn.array(&cut)).map_err(segmentation)?;
         let mut thin = zhang_suen(&mask);
         let mut radii = distance_to_background(&mask).map_err(segmentation)?;
         let thickness = median_width(&thin, &radii);
@@ -240,16 +243,16 @@ fn stations<V: View>(hint: &GapHint) -> Vec<Pixel<V>> {
         .collect()
 }
 
-/// Draws the body over a gap into the mask that begins at `origin`.
-fn draw(cut: &mut Array2<bool>, hint: &GapHint, origin: [f64; 2], half_px: f64) {
+/// Draws the body over a gap into the mask.
+fn draw(mask: &mut Array2<bool>, hint: &GapHint, half_px: f64) {
     let reach = half_px.ceil() as isize;
     for &(row, column) in &hint.path {
-        let (y, x) = (row as isize - origin[1] as isize, column as isize - origin[0] as isize);
+        let (y, x) = (row as isize, column as isize);
         for (dy, dx) in (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dy, dx))) {
             let near = ((dy * dy + dx * dx) as f64).sqrt() <= half_px;
             let at = (usize::try_from(y + dy), usize::try_from(x + dx));
             if let (true, (Ok(y), Ok(x))) = (near, at)
-                && let Some(pixel) = cut.get_mut([y, x])
+                && let Some(pixel) = mask.get_mut([y, x])
             {
                 *pixel = true;
             }

@@ -131,7 +131,8 @@ pub(crate) fn choose(
     let params = search.params;
     let (mut found, mut tried, mut fits) = (Vec::new(), Vec::new(), 0);
     if let Some(earlier) = earlier {
-        found.extend(earlier.finalists);
+        // All with the same freedom, or the freest would win.
+        found.extend(earlier.finalists.into_iter().map(|finalist| search.usual(finalist)));
         (tried, fits) = (earlier.tried, earlier.fits);
     }
     let before = found.len();
@@ -156,18 +157,26 @@ pub(crate) fn choose(
     if !is_good(&finalists) {
         if let Some(best) = finalists.first().cloned() {
             let mut more = Vec::new();
-            search.rewarded(&best, view1, view2, params.max_fits / 3, &mut more)?;
+            search.rewarded(&best, view1, view2, params.max_fits / 3, &mut tried, &mut more)?;
             fits += more.len();
             more.append(&mut finalists);
             finalists = search.finalists(more);
         }
-        // All with the same freedom, or the freest would win.
         let fine: Vec<_> = finalists.iter().filter_map(|c| search.finer(c)).collect();
-        finalists = search.finalists(fine);
+        if !fine.is_empty() {
+            finalists = search.finalists(fine);
+        }
         if !is_good(&finalists) {
-            let mended: Vec<_> =
-                finalists.iter().take(params.repaired).map(|c| search.repaired(c)).collect();
-            finalists.extend(mended);
+            let mut repaired = Vec::new();
+            for candidate in finalists.iter_mut().take(params.repaired) {
+                let better = search.repaired(candidate);
+                if better.score < candidate.score {
+                    repaired.push(better);
+                } else {
+                    candidate.mended = true;
+                }
+            }
+            finalists.append(&mut repaired);
             finalists.sort_by(|a, b| a.score.total_cmp(&b.score));
         }
     }

@@ -3,7 +3,7 @@ use accurate_geom::{Curve3, Rig, View};
 use accurate_traverse::Walk;
 use serde::Serialize;
 
-use super::score::Candidate;
+use super::score::{BENDING, Candidate, MISFIT};
 use super::shape::{Shape, px_per_unit_along};
 
 /// What bears on whether a chosen curve is the right one, all known without the truth.
@@ -20,7 +20,8 @@ pub struct Evidence {
     /// By how much the likeliest curve that is another one (somewhere more than 5 px away) is less
     /// likely, in twelfths of -2 ln of the probability; none if there is no other.
     pub margin: Option<f64>,
-    /// Mean Sampson distance of the walks that the curve started from, px.
+    /// Mean distance of the pixels of view 1 to their partners' epipolar lines, of the walks that the
+    /// curve started from, px.
     pub walks_distance_px: f64,
     /// Part of the less covered skeleton that its walk leaves out.
     pub uncovered: f64,
@@ -43,6 +44,11 @@ pub struct Evidence {
 }
 
 impl Evidence {
+    /// What a score counts of it that does not depend on how many boundary points there are.
+    pub(crate) fn cost(&self) -> f64 {
+        MISFIT * (self.unexplained + self.outside) + BENDING * self.bending
+    }
+
     /// Names of [`Evidence::terms`].
     pub const TERMS: [&'static str; 15] = [
         "unexplained",

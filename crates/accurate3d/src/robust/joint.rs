@@ -131,7 +131,7 @@ pub(crate) struct JointResult {
     pub(crate) walk1: Vec<Pixel<View1>>,
     pub(crate) walk2: Vec<Pixel<View2>>,
     pub(crate) coverage: [f64; 2],
-    /// Mean Sampson distance of the chosen walks' alignment, px.
+    /// Mean distance of the chosen walks' pixels of view 1 to their partners' epipolar lines, px.
     pub(crate) mean_distance_px: f64,
     pub(crate) fits: usize,
     /// What the curve says about the calibration of view 2, if asked.

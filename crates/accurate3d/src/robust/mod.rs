@@ -20,8 +20,10 @@ mod start;
 mod strays;
 mod suspicion;
 
+pub(crate) use choice::RIVAL_PX;
 pub use evidence::Evidence;
 pub(crate) use joint::{JointResult, reconstruct_masks};
 pub use joint::{RobustParams, SecondLook};
+pub(crate) use shape::px_per_unit;
 pub(crate) use strays::without_strays;
 pub use suspicion::Suspicion;

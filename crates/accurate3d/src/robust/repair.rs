@@ -3,7 +3,7 @@ use accurate_geom::{Curve3, Point3, View1, View2};
 
 use super::candidates::ViewCandidates;
 use super::score::Candidate;
-use super::search::Search;
+use super::search::{Search, Tried};
 use super::shape::{dense, is_shown_near, px_per_unit};
 use super::start::through;
 use crate::Error;
@@ -48,10 +48,15 @@ impl Search<'_> {
         };
         let refit = |start: Option<Curve3>, params: &OutlineFitParams| {
             let fit = self.fit(&start?, params)?;
-            Some(from.refitted(fit, self.rig))
+            Some(from.refitted(fit, from.settings, self.rig))
         };
-        let mut moves: Vec<Option<Candidate>> =
-            vec![refit(Some(curve.clone()), &OutlineFitParams::ANNEALED)];
+        // With the same freedom as what it is compared with.
+        let annealed = OutlineFitParams {
+            knot_spacing_px: from.settings.knot_spacing_px,
+            lambda3: from.settings.lambda3,
+            ..OutlineFitParams::ANNEALED
+        };
+        let mut moves: Vec<Option<Candidate>> = vec![refit(Some(curve.clone()), &annealed)];
         let points = dense(curve, self.rig);
         let px_per_unit = px_per_unit(&points, self.rig);
         for at_end in [false, true] {
@@ -79,13 +84,14 @@ impl Search<'_> {
     }
 
     /// New walks that want to pass twice where the best fit leaves outline unexplained, paired and
-    /// fitted.
+    /// fitted where they were not `tried`.
     pub(crate) fn rewarded(
         &self,
         best: &Candidate,
         view1: &mut ViewCandidates<View1>,
         view2: &mut ViewCandidates<View2>,
         max_fits: usize,
+        tried: &mut Vec<Tried>,
         found: &mut Vec<Candidate>,
     ) -> Result<(), Error> {
         let rewards = |view: u8| -> Vec<([f64; 2], f64)> {
@@ -106,7 +112,7 @@ impl Search<'_> {
         // New walks of one view with all of the other.
         for from in [[before[0], 0], [0, before[1]]] {
             if from[0] < view1.walks.len() && from[1] < view2.walks.len() && from != [0, 0] {
-                self.propose_and_fit(view1, view2, from, max_fits, &mut Vec::new(), found)?;
+                self.propose_and_fit(view1, view2, from, max_fits, tried, found)?;
             }
         }
         Ok(())

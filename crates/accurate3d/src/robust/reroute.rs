@@ -4,7 +4,7 @@ use accurate_match::FreeEnds;
 
 use super::other_ways::{OtherWay, other_ways};
 use super::score::Candidate;
-use super::search::{Effort, PLAIN, SAME_PX, Search};
+use super::search::{Effort, PLAIN, SAME_PX, SETTLED, Search};
 use super::shape::{Shape, dense, px_per_unit};
 use super::start::{PRICES, start_from, through};
 
@@ -33,7 +33,8 @@ impl Search<'_> {
                 !finalists.iter().any(|known| shape.is_along(&known.shape, SAME_PX))
             });
             rerouted.extend(starts.take(most).filter_map(|start| {
-                let mut other = candidate.refitted(self.fit(&start, &PLAIN)?, self.rig);
+                let fit = self.fit(&start, &PLAIN)?;
+                let mut other = candidate.refitted(fit, SETTLED, self.rig);
                 other.good = other.is_good(self.params);
                 Some(other)
             }));

@@ -17,8 +17,8 @@ const STRAY_POINTS: [f64; 2] = [120.0, 300.0];
 const STRAY_SHARE: f64 = 0.1;
 /// Weights in a score, all on half a squared px of residual. Of pairs of curves that explain the
 /// outlines, the less bent one is right more often: the other bends to serve the noise.
-const MISFIT: f64 = 2.0;
-const BENDING: f64 = 10.0;
+pub(super) const MISFIT: f64 = 2.0;
+pub(super) const BENDING: f64 = 10.0;
 /// -2 ln of a probability for half a squared px: a residual has the variance 3/18 px² then.
 const SURPRISE_PER_SCORE: f64 = 12.0;
 /// What a boundary point costs that the curve does not use, px²: what it would cost at the truth, so
@@ -119,10 +119,11 @@ impl Candidate {
         candidate
     }
 
-    /// The same origin with another fit.
-    pub(crate) fn refitted(&self, fit: OutlineFit, rig: &Rig) -> Self {
+    /// The same origin with another fit, which is carried on with these settings.
+    pub(crate) fn refitted(&self, fit: OutlineFit, settings: OutlineFitParams, rig: &Rig) -> Self {
         let shape = Shape::new(&fit.curve, rig);
-        let mut candidate = Self { fit, shape, rests: false, mended: false, ..self.clone() };
+        let mut candidate =
+            Self { fit, shape, settings, rests: false, mended: false, ..self.clone() };
         candidate.judge(rig);
         candidate
     }
@@ -136,7 +137,7 @@ impl Candidate {
         params: &RobustParams,
     ) -> Self {
         let prior = 0.5 * (self.prior + other.prior);
-        let mut cross = Self { prior, settings: SETTLED, ..self.clone() }.refitted(fit, rig);
+        let mut cross = Self { prior, ..self.clone() }.refitted(fit, SETTLED, rig);
         cross.good = cross.is_good(params);
         cross
     }

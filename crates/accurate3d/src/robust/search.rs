@@ -229,9 +229,18 @@ impl Search<'_> {
             return Some(candidate.clone());
         }
         let fit = self.fit(&candidate.fit.curve, &FINE)?;
-        let mut finer = candidate.refitted(fit, self.rig);
-        finer.settings = FINE;
-        Some(finer)
+        Some(candidate.refitted(fit, FINE, self.rig))
+    }
+
+    /// The candidate with the usual knots and smoothness again, to stand beside others that have them.
+    pub(crate) fn usual(&self, candidate: Candidate) -> Candidate {
+        if candidate.settings == SETTLED {
+            return candidate;
+        }
+        match self.fit(&candidate.fit.curve, &SETTLED) {
+            Some(fit) => candidate.refitted(fit, SETTLED, self.rig),
+            None => candidate,
+        }
     }
 
     /// The first walk pairs again, matched from corner to corner: some stretches along epipolar lines
@@ -258,7 +267,7 @@ impl Search<'_> {
             for reach_px in BRIDGED_PX {
                 let bridged = self.bridged(candidate, reach_px);
                 if let Some(fit) = bridged.and_then(|start| self.fit(&start, &PLAIN)) {
-                    more.push(candidate.refitted(fit, self.rig));
+                    more.push(candidate.refitted(fit, SETTLED, self.rig));
                 }
             }
             let Some((start, _)) = start else { continue };
@@ -272,7 +281,7 @@ impl Search<'_> {
             }
             for params in [PLAIN, ANNEALED] {
                 if let Some(fit) = self.fit(&start, &params) {
-                    more.push(candidate.refitted(fit, self.rig));
+                    more.push(candidate.refitted(fit, SETTLED, self.rig));
                 }
             }
         }
@@ -329,7 +338,9 @@ impl Search<'_> {
         };
         found.map_or_else(
             |_| (candidate.clone(), None),
-            |(fit, calibration)| (candidate.refitted(fit, given_rig), calibration),
+            |(fit, calibration)| {
+                (candidate.refitted(fit, candidate.settings, given_rig), calibration)
+            },
         )
     }
 
@@ -348,7 +359,7 @@ impl Search<'_> {
         }
         for round in 1..=ROUNDS {
             let Some(fit) = self.fit(&best.fit.curve, &best.settings) else { break };
-            let next = best.refitted(fit, self.rig);
+            let next = best.refitted(fit, best.settings, self.rig);
             let gain = best.score - next.score;
             let rests = gain < REST || next.fit.converged;
             if gain > 0.0 {

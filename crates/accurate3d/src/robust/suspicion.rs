@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::evidence::Evidence;
 
 /// A reason to doubt a reconstruction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Suspicion {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::ScoreKind;
 use super::rows::{Outcome, Row};
-use crate::{Error, InputKind, Params, ViewPair, reconstruct, segment_images};
+use crate::{Error, InputKind, Params, ViewPair, reconstruct, reconstruct_images, segment_images};
 
 /// The cases that a table is measured on.
 #[derive(Debug, Clone)]
@@ -274,7 +274,13 @@ fn score(pair: &ViewPair, row: &Row, method: crate::Method, how: &Measuring<'_>)
     let truth = pair.truth.as_deref().ok_or_else(|| fail("the pair has no truth".to_owned()))?;
     let mut params = Params::new(row.input, method);
     params.robust.calibration = how.calibration;
-    let reconstruction = reconstruct(pair, &params).map_err(|e| fail(e.to_string()))?;
+    let reconstruction = match (row.input, how.segmenter) {
+        (InputKind::Image, Some(segmenter)) => {
+            reconstruct_images(pair, &params, segmenter, &unwatched).map(|(curve, _)| curve)
+        }
+        _ => reconstruct(pair, &params),
+    };
+    let reconstruction = reconstruction.map_err(|e| fail(e.to_string()))?;
     let curve = reconstruction.positions();
     let scored = match how.scores {
         ScoreKind::Table => table_scores(&curve, truth).map(Scored::Table),

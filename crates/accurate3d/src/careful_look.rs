@@ -1,0 +1,243 @@
+use accurate_eval::curve_scores;
+use accurate_seg::{SegError, Segmenter, Watch};
+use serde::Serialize;
+
+use crate::robust::{RIVAL_PX, Suspicion, px_per_unit};
+use crate::{
+    Error, InputKind, Method, Params, Reconstruction, ViewPair, reconstruct, segment_images,
+};
+
+/// What came of a second, careful segmentation of both images.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CarefulLook {
+    /// Whether the curve is the one of the careful segmentation; else the other one explained its
+    /// maps better.
+    pub taken: bool,
+    /// Hausdorff distance of the two curves, px; none if one segmentation gave no curve.
+    pub apart_px: Option<f64>,
+}
+
+/// The curve of a pair of images and, where that is another one, the pair that it rests on.
+///
+/// `pair` holds what [`segment_images`](crate::segment_images) made of its images, and is reconstructed
+/// as by [`reconstruct`]. Where there is reason to doubt that [`Method::Accurate`] found the right curve,
+/// or where it found none, the images are segmented once more with more care
+/// ([`Segmenter::careful`]): another segmentation breaks the body elsewhere. Of the two curves
+/// that one stays which leaves less unexplained and bends less; if they are not the same, that is a
+/// reason for doubt ([`Suspicion::Ambiguous`]).
+///
+/// # Errors
+/// As [`reconstruct`]; [`Error::Segmentation`] if `watch` ends the second segmentation.
+pub fn reconstruct_images(
+    pair: &ViewPair,
+    params: &Params,
+    segmenter: &dyn Segmenter,
+    watch: &Watch<'_>,
+) -> Result<(Reconstruction, Option<ViewPair>), Error> {
+    let first = reconstruct(pair, params);
+    let careful = segmenter.careful().filter(|_| is_worth_a_look(&first, params));
+    let Some(careful) = careful else { return first.map(|curve| (curve, None)) };
+    let again = match segment_images(pair.clone(), &*careful, watch) {
+        Ok(again) => again,
+        Err(error @ Error::Segmentation { source: SegError::Cancelled { .. }, .. }) => {
+            return Err(error);
+        }
+        // Nothing found: the first look is all there is.
+        Err(_) => return first.map(|curve| (curve, None)),
+    };
+    match (first, reconstruct(&again, params)) {
+        (Ok(first), Ok(second)) => {
+            let apart_px = apart_px(&first, &second, pair);
+            let taken = cost(&second) < cost(&first);
+            let mut curve = if taken { second } else { first };
+            doubt(&mut curve, apart_px);
+            curve.diagnostics.careful_look = Some(CarefulLook { taken, apart_px });
+            Ok((curve, taken.then_some(again)))
+        }
+        (Ok(mut curve), Err(_)) => {
+            curve.diagnostics.careful_look = Some(CarefulLook { taken: false, apart_px: None });
+            Ok((curve, None))
+        }
+        (Err(_), Ok(mut curve)) => {
+            curve.diagnostics.careful_look = Some(CarefulLook { taken: true, apart_px: None });
+            Ok((curve, Some(again)))
+        }
+        (Err(error), Err(_)) => Err(error),
+    }
+}
+
+/// Noise and depth that is weakly seen stay with any segmentation.
+fn is_worth_a_look(first: &Result<Reconstruction, Error>, params: &Params) -> bool {
+    if params.method != Method::Accurate || params.input != InputKind::Image {
+        return false;
+    }
+    match first {
+        Ok(curve) => curve
+            .diagnostics
+            .suspicions
+            .iter()
+            .any(|reason| !matches!(reason, Suspicion::Misfit | Suspicion::Uncertain)),
+        Err(Error::NotSegmented { .. } | Error::MissingInput { .. }) => false,
+        Err(_) => true,
+    }
+}
+
+/// What speaks against a curve, of what can be compared between segmentations.
+fn cost(curve: &Reconstruction) -> f64 {
+    curve.diagnostics.outline.map_or(f64::INFINITY, |outline| outline.evidence.cost())
+}
+
+fn apart_px(a: &Reconstruction, b: &Reconstruction, pair: &ViewPair) -> Option<f64> {
+    let (a, b) = (a.positions(), b.positions());
+    let per_unit = px_per_unit(&a, &pair.rig);
+    Some(curve_scores(&a, &b, 1.0 / per_unit).ok()?.hausdorff * per_unit)
+}
+
+fn doubt(curve: &mut Reconstruction, apart_px: Option<f64>) {
+    let reasons = &mut curve.diagnostics.suspicions;
+    if apart_px.is_none_or(|px| px > RIVAL_PX) && !reasons.contains(&Suspicion::Ambiguous) {
+        reasons.push(Suspicion::Ambiguous);
+        reasons.sort_unstable();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use accurate_seg::{Mask, Progress, Segmentation, unwatched};
+    use accurate_synth::{CaseOptions, Family, SynthCase, generate};
+    use ndarray::Array2;
+
+    use super::*;
+
+    /// Reads the body off an image that shows nothing else, but in view 1, which it is asked for first, some
+    /// rows too high.
+    #[derive(Debug)]
+    struct Off {
+        rows: usize,
+        careful: Option<Box<Off>>,
+        asked: AtomicUsize,
+    }
+
+    impl Off {
+        fn new(rows: usize, careful: Option<Self>) -> Self {
+            Self { rows, careful: careful.map(Box::new), asked: AtomicUsize::new(0) }
+        }
+    }
+
+    impl Segmenter for Off {
+        fn segment(
+            &self,
+            image: &Array2<f32>,
+            watch: &Watch<'_>,
+        ) -> Result<Segmentation, SegError> {
+            let first = self.asked.fetch_add(1, Ordering::Relaxed).is_multiple_of(2);
+            if watch(Progress { done: 0, total: 1 }).is_break() {
+                return Err(SegError::Cancelled { done: 0, total: 1 });
+            }
+            let rows = if first { self.rows } else { 0 };
+            let seen = |(row, column): (usize, usize)| {
+                image.get([row + rows, column]).map_or(0.0, |grey| 1.0 - grey)
+            };
+            let probability = Array2::from_shape_fn(image.dim(), seen);
+            let mask = Mask::from_array(probability.mapv(|p| p > 0.5))?;
+            Ok(Segmentation { probability, mask })
+        }
+
+        fn careful(&self) -> Option<Box<dyn Segmenter + '_>> {
+            let careful = self.careful.as_ref()?;
+            Some(Box::new(Borrowed(careful)))
+        }
+
+        fn describe(&self) -> String {
+            format!("dark pixels, {} rows too high", self.rows)
+        }
+    }
+
+    #[derive(Debug)]
+    struct Borrowed<'a>(&'a Off);
+
+    impl Segmenter for Borrowed<'_> {
+        fn segment(
+            &self,
+            image: &Array2<f32>,
+            watch: &Watch<'_>,
+        ) -> Result<Segmentation, SegError> {
+            self.0.segment(image, watch)
+        }
+
+        fn describe(&self) -> String {
+            self.0.describe()
+        }
+    }
+
+    /// The masks as images.
+    fn case() -> (SynthCase, ViewPair) {
+        let case = generate(Family::Easy, 1000, 0, &CaseOptions::default()).unwrap();
+        let mut pair = ViewPair::from(case.clone());
+        pair.images = Some(case.masks.clone().map(|m| m.mapv(|body| f32::from(u8::from(!body)))));
+        pair.masks = None;
+        (case, pair)
+    }
+
+    const FAR_ROWS: usize = 12;
+
+    fn looked(
+        pair: &ViewPair,
+        segmenter: &Off,
+    ) -> Result<(Reconstruction, Option<ViewPair>), Error> {
+        let pair = segment_images(pair.clone(), segmenter, &unwatched).unwrap();
+        let params = Params::new(InputKind::Image, Method::Accurate);
+        reconstruct_images(&pair, &params, segmenter, &unwatched)
+    }
+
+    #[test]
+    fn in_doubt_the_better_explained_of_two_segmentations_is_taken() {
+        let (case, pair) = case();
+        let segmenter = Off::new(FAR_ROWS, Some(Off::new(0, None)));
+        let (curve, seen) = looked(&pair, &segmenter).unwrap();
+        let look = curve.diagnostics.careful_look.unwrap();
+        assert!(look.taken && look.apart_px.unwrap() > RIVAL_PX, "{look:?}");
+        assert!(curve.diagnostics.suspicions.contains(&Suspicion::Ambiguous));
+        assert_eq!(seen.unwrap().masks, Some(case.masks));
+
+        // The other way round the first one stays, if it is doubted at all.
+        let segmenter = Off::new(0, Some(Off::new(FAR_ROWS, None)));
+        let (whole, seen) = looked(&pair, &segmenter).unwrap();
+        assert!(seen.is_none() && whole.diagnostics.careful_look.is_none_or(|look| !look.taken));
+        assert_eq!(whole.points, curve.points);
+    }
+
+    #[test]
+    fn what_is_not_doubted_is_not_looked_at_again() {
+        let (_, pair) = case();
+        let segmenter = Off::new(0, Some(Off::new(0, None)));
+        let (curve, seen) = looked(&pair, &segmenter).unwrap();
+        assert!(curve.diagnostics.suspicions.is_empty() && seen.is_none());
+        assert_eq!(curve.diagnostics.careful_look, None);
+        assert_eq!(segmenter.careful.unwrap().asked.into_inner(), 0);
+    }
+
+    #[test]
+    fn one_way_of_segmenting_is_all_there_is_and_the_second_can_be_ended() {
+        let (_, pair) = case();
+        let (curve, seen) = looked(&pair, &Off::new(FAR_ROWS, None)).unwrap();
+        assert!(!curve.diagnostics.suspicions.is_empty() && seen.is_none());
+        assert_eq!(curve.diagnostics.careful_look, None);
+
+        let segmenter = Off::new(FAR_ROWS, Some(Off::new(0, None)));
+        let pair = segment_images(pair, &segmenter, &unwatched).unwrap();
+        let params = Params::new(InputKind::Image, Method::Accurate);
+        let ended = |_| ControlFlow::Break(());
+        let refused = reconstruct_images(&pair, &params, &segmenter, &ended);
+        assert!(matches!(
+            refused,
+            Err(Error::Segmentation { source: SegError::Cancelled { .. }, .. })
+        ));
+        let paper = Params::new(InputKind::Image, Method::Paper);
+        let (curve, _) = reconstruct_images(&pair, &paper, &segmenter, &ended).unwrap();
+        assert_eq!(curve.diagnostics.careful_look, None);
+    }
+}
