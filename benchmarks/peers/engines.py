@@ -90,7 +90,8 @@ library = next(Path(onnxruntime.__file__).parent.glob("capi/libonnxruntime.so.*"
 
 def run(engine, paths, folder):
     """User seconds and peak memory, MiB, of one process of ours."""
-    command = [program, "-q", "--threads", str(args.threads), "segment", *map(str, paths)]
+    command = [program, "-q", "--threads", str(args.threads), "segment", "--mirror", "never"]
+    command += map(str, paths)
     command += ["--model", str(args.model), "--engine", engine, "-o", str(folder / "out")]
     command += ["--onnxruntime", str(library)]
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL)

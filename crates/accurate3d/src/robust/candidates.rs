@@ -305,3 +305,48 @@ pub(crate) fn free_ends<V: View>(walk: &Walk<V>) -> FreeEnds {
     let begin_px = free(walk.ends[0], &mut walk.flags.iter());
     FreeEnds { begin_px, end_px: free(walk.ends[1], &mut walk.flags.iter().rev()) }
 }
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::View1;
+
+    use super::*;
+
+    /// The top of an arch, where the map is faint, lies outside of what the mask shows.
+    #[test]
+    fn a_gap_at_the_outermost_bend_is_walked_over() {
+        const CENTRE: f64 = 60.0;
+        const RADIUS: f64 = 30.0;
+        const GAP_RAD: f64 = 0.8;
+        let body = |row: usize, column: usize| {
+            let (x, y) = (column as f64 - CENTRE, row as f64 - CENTRE);
+            let (off, from_top) = if y > 0.0 {
+                (x.abs() - RADIUS, std::f64::consts::FRAC_PI_2)
+            } else {
+                (x.hypot(y) - RADIUS, x.abs().atan2(-y))
+            };
+            (off.abs() <= 1.5 && row <= 100).then_some(from_top < GAP_RAD)
+        };
+        let shape = (120, 120);
+        let map = Array2::from_shape_fn(shape, |(row, column)| match body(row, column) {
+            None => 0.0,
+            Some(true) => 0.2_f32,
+            Some(false) => 0.9,
+        });
+        let mask = map.mapv(|p| p > 0.5);
+        let view = ViewCandidates::<View1>::of(
+            &mask,
+            Some(&map),
+            &WalkParams::DEFAULT,
+            Turn::NONE,
+            "arch",
+        )
+        .unwrap();
+        let top = Pixel::new(CENTRE, CENTRE - RADIUS);
+        let passes = |walk: &Walk<View1>| {
+            let ends = [walk.points[0], walk.points[walk.points.len() - 1]];
+            walk.points.iter().any(|p| p.distance(top) < 2.0) && ends.iter().all(|p| p.y > 95.0)
+        };
+        assert!(view.walks.iter().any(passes), "{}", view.walks.len());
+    }
+}
