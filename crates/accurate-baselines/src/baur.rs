@@ -40,8 +40,8 @@ pub struct Baur {
     /// Length of a span of the spline in space, px of the images.
     pub span_px: f64,
     /// Weight of the integral of the squared curvature (taken in 1/px) against squared px: px³.
-    /// Details shorter than about its fourth root, times the root of the sample spacing, are
-    /// smoothed.
+    /// Details shorter than about the fourth root of its product with the sample spacing (3.2 px at
+    /// the defaults) are smoothed.
     pub curvature_weight_px3: f64,
     /// Length of the device, if it is known and all of it is seen.
     pub known_length: Option<KnownLength>,

@@ -3,6 +3,11 @@ use std::collections::BinaryHeap;
 
 use accurate_match::MatchError;
 
+use crate::room::{all_pairs, check_room};
+
+/// A cost and a step, without the queue.
+const CELL_BYTES: u64 = 9;
+
 /// The cheapest monotone path through a grid of cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridPath {
@@ -21,9 +26,10 @@ pub struct GridPath {
 /// and only a strictly cheaper way replaces an earlier one.
 ///
 /// # Errors
-/// [`MatchError::Empty`] without cells; [`MatchError::InvalidCost`] at the first visited cell
-/// whose cost is negative or NaN; [`MatchError::NoFinitePath`] if every path meets an infinite cell or
-/// its sum overflows.
+/// [`MatchError::Empty`] without cells; [`MatchError::TooLarge`] if they need more than
+/// [`MAX_ALIGNMENT_BYTES`](accurate_match::MAX_ALIGNMENT_BYTES); [`MatchError::InvalidCost`] at the
+/// first visited cell whose cost is negative or NaN; [`MatchError::NoFinitePath`] if every path meets an
+/// infinite cell or its sum overflows.
 ///
 /// # Cost
 /// O(n1 n2 log(n1 n2)) time, 9 bytes per cell plus the queue.
@@ -46,6 +52,7 @@ pub fn cheapest_grid_path(
         if value >= 0.0 { Ok(value) } else { Err(MatchError::InvalidCost { i, j, value }) }
     };
     let goal = (n1 - 1, n2 - 1);
+    check_room(all_pairs(n1, n2), CELL_BYTES, n1, n2)?;
     let mut reached = vec![f64::INFINITY; n1 * n2];
     // The step by which a cell was reached: bit 0 advances j, bit 1 advances i; bit 2: settled.
     let mut came_by = vec![0u8; n1 * n2];
@@ -205,16 +212,57 @@ mod tests {
             prop_assert!(kept.windows(2).all(|w| w[0].0 < w[1].0 && w[0].1 < w[1].1));
             prop_assert!(kept.iter().all(|pair| path.cells.contains(pair)));
         }
+
+        /// The cheapest of its run is kept, unless that of a run beside it shares an index and costs
+        /// no more; and nothing else is. On any path: the cheapest has corners only where cells are
+        /// free, and without a corner no two runs share an index.
+        #[test]
+        fn the_cheapest_of_every_run_is_kept(
+            steps in prop::collection::vec(1..=3usize, 0..20),
+            costs in prop::collection::vec(0.0..10.0f64, 20 * 20),
+        ) {
+            let cost = |&(i, j): &(usize, usize)| costs[i * 20 + j];
+            let mut cells = vec![(0, 0)];
+            for step in steps {
+                let (i, j) = cells[cells.len() - 1];
+                cells.push((i + (step >> 1), j + (step & 1)));
+            }
+            let kept = cheapest_of_each_run(&cells, |i, j| cost(&(i, j)));
+            prop_assert!(kept.windows(2).all(|w| w[0].0 < w[1].0 && w[0].1 < w[1].1));
+            let mut cheapest = Vec::new();
+            let mut rest = &cells[..];
+            while let Some(&(i, j)) = rest.first() {
+                let row = rest.partition_point(|c| c.0 == i);
+                let column = rest.partition_point(|c| c.1 == j);
+                let (run, after) = rest.split_at(row.max(column));
+                cheapest.extend(run.iter().copied().min_by(|a, b| cost(a).total_cmp(&cost(b))));
+                rest = after;
+            }
+            prop_assert!(kept.iter().all(|pair| cheapest.contains(pair)));
+            for (k, own) in cheapest.iter().enumerate() {
+                let beside = [k.checked_sub(1), Some(k + 1)].into_iter().flatten();
+                let settled = beside.filter_map(|n| cheapest.get(n)).any(|other| {
+                    (other.0 == own.0 || other.1 == own.1) && cost(other) <= cost(own)
+                });
+                prop_assert!(settled || kept.contains(own), "{own:?} of {cheapest:?}: {kept:?}");
+            }
+        }
     }
 
     #[test]
-    fn costs_that_are_negative_or_not_a_number_are_refused() {
+    fn unusable_grids_and_costs_are_refused() {
         assert!(matches!(cheapest_grid_path(0, 3, |_, _| 1.0), Err(MatchError::Empty { view: 1 })));
         for bad in [-1.0, f64::NAN] {
             assert!(matches!(
                 cheapest_grid_path(2, 2, |_, _| bad),
                 Err(MatchError::InvalidCost { i: 0, j: 0, .. })
             ));
+        }
+        for many in [1 << 20, 1 << 40] {
+            let found = cheapest_grid_path(many, many, |_, _| 1.0);
+            assert!(
+                matches!(found, Err(MatchError::TooLarge { n1, n2, .. }) if n1 == many && n2 == many)
+            );
         }
         for huge in [f64::MAX, f64::INFINITY] {
             let none = Err(MatchError::NoFinitePath { n1: 9, n2: 9 });

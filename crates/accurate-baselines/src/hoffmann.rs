@@ -4,7 +4,12 @@ use accurate_match::{CurveMatcher, CurveReconstruction, MatchError, validate_cur
 use crate::chain::longest_cheapest_chain;
 use crate::range::{not_negative, positive};
 use crate::resample::{Match, Scene};
+use crate::room::check_room;
 use crate::track::Track;
+
+/// A candidate, its place, its row, its link, its share of the tree, of the levels and of their costs in
+/// the search for the longest chain.
+const CANDIDATE_BYTES: u64 = 128;
 
 /// Hoffmann's method in a fair reading: `hoffmann`.
 ///
@@ -27,7 +32,8 @@ use crate::track::Track;
 ///
 /// # Cost
 /// O(samples · spline spans) for the candidates; for M of them O(M log M) and the pairs of
-/// neighbouring chain lengths, a few M unless crossings come in clouds.
+/// neighbouring chain lengths, a few M unless crossings come in clouds. What would need more than
+/// [`MAX_ALIGNMENT_BYTES`](accurate_match::MAX_ALIGNMENT_BYTES) is refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hoffmann {
     /// Noise of the input points per coordinate, px: how closely the splines follow them; 0 for
@@ -73,7 +79,9 @@ impl CurveMatcher for Hoffmann {
         let scene = Scene { rig, track1: &track1, track2: &track2 };
 
         let samples = track1.samples(self.step_px, usize::MAX);
-        let nodes = self.candidates(&scene, &samples);
+        let room =
+            |candidates| check_room(candidates, CANDIDATE_BYTES, samples.len(), curve2.len());
+        let nodes = self.candidates(&scene, &samples, room)?;
         let ratio = track2.length_px() / track1.length_px();
         let unevenness = |from: (usize, f64), to: (usize, f64)| {
             let off = (to.1 - from.1) - ratio * (samples[to.0] - samples[from.0]);
@@ -94,7 +102,13 @@ impl CurveMatcher for Hoffmann {
 
 impl Hoffmann {
     /// `(sample, place along view 2)`, sorted by sample, then place.
-    fn candidates(&self, scene: &Scene<'_>, samples: &[f64]) -> Vec<(usize, f64)> {
+    /// Refused as soon as `check` refuses their number.
+    fn candidates(
+        &self,
+        scene: &Scene<'_>,
+        samples: &[f64],
+        check: impl Fn(u64) -> Result<(), MatchError>,
+    ) -> Result<Vec<(usize, f64)>, MatchError> {
         let line_of = scene.rig.fundamental().transpose();
         let mut nodes = Vec::new();
         for (i, &u1) in samples.iter().enumerate() {
@@ -106,9 +120,10 @@ impl Hoffmann {
                 places.sort_unstable_by(f64::total_cmp);
                 places.dedup();
             }
+            check((nodes.len() + places.len()) as u64)?;
             nodes.extend(places.into_iter().map(|u2| (i, u2)));
         }
-        nodes
+        Ok(nodes)
     }
 }
 
@@ -140,4 +155,40 @@ fn join(
     let mut whole = whole.ok_or(failure)?;
     whole.dropped = dropped;
     Ok(whole)
+}
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::nalgebra::{Matrix3, Vector3};
+    use accurate_geom::{Camera, ImageSize, LengthUnit};
+
+    use super::*;
+
+    #[test]
+    fn no_candidate_is_kept_beyond_the_room_there_is() {
+        let k = Matrix3::new(1000.0, 0.0, 256.0, 0.0, 1000.0, 256.0, 0.0, 0.0, 1.0);
+        let size = ImageSize { width: 512, height: 512 };
+        let camera = |x: f64| {
+            Camera::new(k, Matrix3::identity(), Vector3::new(x, 0.0, 100.0), size).unwrap()
+        };
+        // Rectified: a column meets the line of each of its points once.
+        let rig = Rig::new(camera(0.0), camera(-10.0), LengthUnit::Unit).unwrap();
+        let column = |x: f64| (0..40).map(move |y| (x, f64::from(y)));
+        let curve1: Vec<_> = column(200.0).map(|(x, y)| Pixel::new(x, y)).collect();
+        let curve2: Vec<_> = column(100.0).map(|(x, y)| Pixel::new(x, y)).collect();
+        let (track1, track2) =
+            (Track::new(&curve1, 0.0).unwrap(), Track::new(&curve2, 0.0).unwrap());
+        let scene = Scene { rig: &rig, track1: &track1, track2: &track2 };
+        let samples = track1.samples(1.0, usize::MAX);
+        let at_most = |most: u64| {
+            let check = move |count| {
+                let refusal = MatchError::NoCorrespondence { method: "full", candidates: 0 };
+                if count <= most { Ok(()) } else { Err(refusal) }
+            };
+            Hoffmann::default().candidates(&scene, &samples, check)
+        };
+        let all = at_most(u64::MAX).unwrap().len() as u64;
+        assert!(all >= 38, "{all}");
+        assert!(at_most(all).is_ok() && at_most(all - 1).is_err());
+    }
 }

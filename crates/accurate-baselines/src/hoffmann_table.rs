@@ -6,6 +6,10 @@ use accurate_match::{
 
 use crate::chain::longest_chain;
 use crate::range::not_negative;
+use crate::room::{all_pairs, check_room};
+
+/// A candidate, its copy in order, its row, its column and its link in [`longest_chain`].
+const CANDIDATE_BYTES: u64 = 72;
 
 /// Hoffmann's method as comparison tables run it: `hoffmann-table`.
 ///
@@ -23,7 +27,9 @@ use crate::range::not_negative;
 ///
 /// # Cost
 /// O(n1 n2) distances and O(M log M) time, O(M) memory, for M candidates: 5 to 10 per point at the
-/// default threshold, all n1 n2 at a threshold as large as the image.
+/// default threshold, all n1 n2 at a threshold as large as the image or where both curves run along one
+/// epipolar line. What would need more than [`MAX_ALIGNMENT_BYTES`](accurate_match::MAX_ALIGNMENT_BYTES)
+/// is refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoffmannTable {
     /// Candidates are nearer to the epipolar line than this, px. 1.0 in the table.
@@ -57,14 +63,7 @@ impl CurveMatcher for HoffmannTable {
     ) -> Result<CurveReconstruction, MatchError> {
         not_negative("threshold_px", self.threshold_px)?;
         let costs = CostModel::new(rig.fundamental(), curve1, curve2, DistanceKind::View2)?;
-        let mut row = vec![0.0; curve2.len()];
-        let mut candidates = Vec::new();
-        for i in 0..curve1.len() {
-            costs.fill_row(i, &mut row);
-            let near = row.iter().enumerate().filter(|(_, d)| **d < self.threshold_px);
-            candidates.extend(near.map(|(j, _)| (i, j)));
-        }
-        let chain = longest_chain(&candidates);
+        let chain = longest_chain(&self.candidates(&costs)?);
         if chain.is_empty() {
             return Err(MatchError::NoCorrespondence { method: Self::NAME, candidates: 0 });
         }
@@ -73,5 +72,29 @@ impl CurveMatcher for HoffmannTable {
             .map(|(i, j)| PixelPair { cell: (i, j), pixel1: curve1[i], pixel2: curve2[j] })
             .collect();
         triangulate_pairs(Self::NAME, rig, Triangulation::Dlt, &pairs)
+    }
+}
+
+impl HoffmannTable {
+    /// All pairs below the threshold, in order. Along an epipolar line that is every pair of points.
+    fn candidates(&self, costs: &CostModel) -> Result<Vec<(usize, usize)>, MatchError> {
+        let (n1, n2) = (costs.n1(), costs.n2());
+        let mut row = vec![0.0; n2];
+        // Counted first only where there may be too many: it asks for every distance once more.
+        if check_room(all_pairs(n1, n2), CANDIDATE_BYTES, n1, n2).is_err() {
+            let mut count = 0;
+            for i in 0..n1 {
+                costs.fill_row(i, &mut row);
+                count += row.iter().filter(|d| **d < self.threshold_px).count() as u64;
+            }
+            check_room(count, CANDIDATE_BYTES, n1, n2)?;
+        }
+        let mut candidates = Vec::new();
+        for i in 0..n1 {
+            costs.fill_row(i, &mut row);
+            let near = row.iter().enumerate().filter(|(_, d)| **d < self.threshold_px);
+            candidates.extend(near.map(|(j, _)| (i, j)));
+        }
+        Ok(candidates)
     }
 }

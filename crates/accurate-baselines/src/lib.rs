@@ -32,6 +32,7 @@ mod pchip;
 mod range;
 mod reprojection_fit;
 mod resample;
+mod room;
 mod track;
 mod uniform_spline;
 

@@ -4,8 +4,7 @@
 use std::time::Instant;
 
 use accurate_eval::{
-    Case, CaseOutcome, DEFAULT_RESAMPLES, Dataset, EvalError, curve_scores, published, summarise,
-    table_scores,
+    DEFAULT_RESAMPLES, Dataset, EvalError, bootstrap_mean, curve_scores, published, table_scores,
 };
 use accurate_geom::Point3;
 
@@ -33,34 +32,16 @@ fn main() -> Result<(), EvalError> {
     println!("point sets ({table_ms:.1} ms): {table:?}");
     println!("curves ({curve_ms:.1} ms): {curve:?}");
 
-    let mut cases: Vec<Case> = (0..12)
+    let overalls = (0..12)
         .map(|k| {
-            let found = helix(3000, 0.1 + 0.02 * f64::from(k), f64::from(k));
-            Ok(Case {
-                name: format!("helix_{k:02}"),
-                outcome: CaseOutcome::Scored(table_scores(&found, &truth)?),
-                truth_diagonal: None,
-            })
+            Ok(table_scores(&helix(3000, 0.1 + 0.02 * f64::from(k), f64::from(k)), &truth)?.overall)
         })
-        .collect::<Result<_, EvalError>>()?;
-    cases.push(Case {
-        name: "helix_12".into(),
-        outcome: CaseOutcome::Failed { reason: "view 2: no endpoint".into() },
-        truth_diagonal: None,
-    });
-    let summary = summarise(&cases, DEFAULT_RESAMPLES, "example/helix/overall")?;
-    if let Some(metrics) = summary.metrics {
-        let overall = metrics.overall.mean;
-        println!(
-            "overall {:.4} mm [{:.4}, {:.4}], n = {}, {} failed ({})",
-            overall.mean,
-            overall.low,
-            overall.high,
-            overall.n,
-            summary.failures.len(),
-            summary.failures[0].reason
-        );
-    }
+        .collect::<Result<Vec<_>, EvalError>>()?;
+    let overall = bootstrap_mean(&overalls, DEFAULT_RESAMPLES, "example/helix/overall")?;
+    println!(
+        "overall {:.4} mm [{:.4}, {:.4}], n = {}",
+        overall.mean, overall.low, overall.high, overall.n
+    );
     if let Some(row) = published("ours-points", Dataset::Phantom) {
         println!(
             "the paper's phantom, ordered points: {:.4} {}",

@@ -26,6 +26,11 @@ pub(crate) fn points(which: &'static str, points: &[Point3]) -> Result<(), EvalE
     Ok(())
 }
 
+/// Refuses a result that has overflowed, or is what an overflow left behind.
+pub(crate) fn result(what: &'static str, value: f64) -> Result<f64, EvalError> {
+    if value.is_finite() { Ok(value) } else { Err(EvalError::Overflow { what, value }) }
+}
+
 /// Refuses an empty list of numbers and numbers that are not finite.
 pub(crate) fn values(which: &'static str, values: &[f64]) -> Result<(), EvalError> {
     if values.is_empty() {

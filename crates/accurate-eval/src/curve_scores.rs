@@ -1,10 +1,10 @@
 use accurate_geom::Point3;
 
-use crate::EvalError;
 use crate::frechet::coupling_distance;
 use crate::nearest::PolylineIndex;
 use crate::quantile::sorted_quantile;
 use crate::resample::{check_spacing, length, resample};
+use crate::{EvalError, check};
 
 /// Distances between two *curves*, in the unit of the world.
 ///
@@ -49,7 +49,8 @@ pub struct CurveScores {
 ///
 /// # Errors
 /// [`EvalError::InvalidArgument`] if the spacing is not positive, [`EvalError::NoLength`] if a curve
-/// has no two different points, [`EvalError::TooManySamples`] beyond 65 536 samples, and as
+/// has no two different points, [`EvalError::TooManySamples`] beyond 65 536 samples,
+/// [`EvalError::Overflow`] if the lengths are too far apart for a ratio, and as
 /// [`table_scores`](crate::table_scores).
 ///
 /// # Cost
@@ -73,6 +74,8 @@ pub fn curve_scores(
     let reversed = coupling_distance(dense_reconstruction.iter().rev(), &dense_truth);
     let (reconstruction_length, truth_length) = (length(reconstruction), length(truth));
     let length_error = reconstruction_length - truth_length;
+    let relative_length_error =
+        check::result("relative length error", length_error / truth_length)?;
     Ok(CurveScores {
         accuracy,
         completeness,
@@ -87,7 +90,7 @@ pub fn curve_scores(
         reconstruction_length,
         truth_length,
         length_error,
-        relative_length_error: length_error / truth_length,
+        relative_length_error,
     })
 }
 

@@ -19,6 +19,14 @@ pub enum EvalError {
         /// Index in the list, from 0.
         index: usize,
     },
+    /// The numbers given are finite, but what follows from them is not.
+    #[error("{what} is not finite: {value}")]
+    Overflow {
+        /// What was to be computed, e.g. `relative length error`.
+        what: &'static str,
+        /// What came out.
+        value: f64,
+    },
     /// A coordinate is so large that its square overflows.
     #[error("{which}: element {index} has a coordinate of {value:e}, beyond {limit:e}")]
     TooLarge {
@@ -92,12 +100,6 @@ pub enum EvalError {
         spread_ratio: f64,
         /// The least accepted.
         needed: f64,
-    },
-    /// A case failed and carries no penalty, so that no penalised mean exists.
-    #[error("case {case} failed and has no truth diagonal to be penalised with")]
-    NoPenalty {
-        /// Name of the case.
-        case: String,
     },
     /// A point of a curve cannot be projected.
     #[error("{which}: point {index}: {source}")]

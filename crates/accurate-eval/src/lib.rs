@@ -4,8 +4,7 @@
 //! - [`curve_scores`], [`reprojection_rms`]: between curves, whatever their sampling.
 //! - [`dice`], [`cl_dice`], [`skeleton_agreement`], [`betti_0_error`], [`centreline_distance`]: of a
 //!   segmentation, from masks and the caller's skeletons.
-//! - [`summarise`], [`bootstrap_mean`], [`fraction_below`]: over the cases of a set, failures
-//!   counted, never averaged away.
+//! - [`bootstrap_mean`], [`median`], [`quantile`], [`fraction_below`]: over the cases of a set.
 //! - [`align_similarity`]: for methods that know neither scale nor pose.
 //! - [`published`]: the paper's own numbers, as data.
 //!
@@ -38,7 +37,6 @@ mod quantile;
 mod reprojection;
 mod resample;
 mod scores;
-mod summary;
 mod umeyama;
 
 pub use centreline::{CentrelineDistance, centreline_distance};
@@ -57,8 +55,4 @@ pub use published::{
 pub use quantile::{Proportion, fraction_below, median, quantile, wilson_interval};
 pub use reprojection::{ReprojectionRms, reprojection_rms};
 pub use scores::{TableScores, accuracy, completeness, table_scores};
-pub use summary::{
-    Case, CaseOutcome, Failure, MetricSummary, Summary, TableSummary, bounding_box_diagonal,
-    penalised_means, summarise, summarise_metric,
-};
 pub use umeyama::{Alignment, LEAST_SPREAD_RATIO, Similarity, align_rigid, align_similarity};

@@ -19,7 +19,9 @@ pub struct ReprojectionRms {
 /// the truth is projected vertex by vertex, for the image of a segment is a segment.
 ///
 /// # Errors
-/// [`EvalError::Projection`] if a point is not in front of a camera; otherwise as
+/// [`EvalError::Projection`] if a point is not in front of a camera; [`EvalError::NotFinite`] if it is so
+/// near to the plane of the camera that its image is infinite, [`EvalError::Overflow`] if images are so
+/// far apart that the squares of their distances are; otherwise as
 /// [`curve_scores`](crate::curve_scores).
 pub fn reprojection_rms(
     reconstruction: &[Point3],
@@ -40,7 +42,7 @@ fn rms_px(samples: &[Point3], truth: &[Point3], camera: &Camera) -> Result<f64, 
     let line = PolylineIndex::new(&project("truth", truth, camera)?);
     let image = project("reconstruction", samples, camera)?;
     let sum: f64 = line.distances(&image).into_iter().map(|distance| distance.powi(2)).sum();
-    Ok((sum / image.len() as f64).sqrt())
+    check::result("root mean square reprojection error", (sum / image.len() as f64).sqrt())
 }
 
 fn project(

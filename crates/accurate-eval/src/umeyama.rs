@@ -45,7 +45,8 @@ pub const LEAST_SPREAD_RATIO: f64 = 1e-6;
 /// # Errors
 /// [`EvalError::LengthMismatch`]; [`EvalError::Empty`], [`EvalError::NotFinite`],
 /// [`EvalError::TooLarge`]; [`EvalError::InvalidArgument`] for a negative weight or all zero;
-/// [`EvalError::Collinear`] if the points lie on a line.
+/// [`EvalError::Collinear`] if the points lie on a line; [`EvalError::Overflow`] if the sets are so
+/// different in size that the scale, or what remains, is no number.
 ///
 /// # Source
 /// Umeyama, Least-squares estimation of transformation parameters between two point patterns, 1991,
@@ -123,6 +124,7 @@ fn align(
     } else {
         1.0
     };
+    check::result("scale", scale)?;
     let translation = target_mean - scale * (rotation * source_mean);
     let target_from_source = Similarity { scale, rotation, translation };
     let squared: f64 = source
@@ -131,7 +133,8 @@ fn align(
         .zip(&weights)
         .map(|((s, t), w)| w * (target_from_source.apply(s) - t).norm_squared())
         .sum();
-    Ok(Alignment { target_from_source, rms: squared.sqrt(), spread_ratio })
+    let rms = check::result("root mean square of an alignment", squared.sqrt())?;
+    Ok(Alignment { target_from_source, rms, spread_ratio })
 }
 
 /// Weights with sum 1.

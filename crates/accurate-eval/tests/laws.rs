@@ -5,8 +5,8 @@ use accurate_eval::{
     accuracy, align_rigid, align_similarity, completeness, curve_scores, discrete_frechet,
     table_scores,
 };
-use accurate_geom::Point3;
 use accurate_geom::nalgebra::{Rotation3, Vector3};
+use accurate_geom::{Point3, Polyline3};
 use proptest::prelude::*;
 
 /// Curves within a cube of half side 50.
@@ -62,6 +62,42 @@ proptest! {
         // Samples are rounded off the line they are on by a product and a sum.
         prop_assert!(curve.hausdorff <= rounding(50.0));
         prop_assert_eq!((curve.frechet, curve.frechet_reversed, curve.length_error), (0.0, false, 0.0));
+    }
+
+    #[test]
+    fn curve_scores_equal_their_definition_by_brute_force(
+        a in curves(2..12), b in curves(2..12), spacing in 1.0..20.0_f64,
+    ) {
+        let scores = curve_scores(&a, &b, spacing).unwrap();
+        let samples = |points: &[Point3]| {
+            let line = Polyline3::new(points.to_vec()).unwrap();
+            let steps = (line.length() / spacing).ceil();
+            (0..=steps as usize).map(|k| line.at(line.length() * (k as f64 / steps))).collect::<Vec<_>>()
+        };
+        let ascending = |from: &[Point3], to: &[Point3]| {
+            let line = Polyline3::new(to.to_vec()).unwrap();
+            let mut distances: Vec<_> = from.iter().map(|p| line.closest(p).distance).collect();
+            distances.sort_by(f64::total_cmp);
+            distances
+        };
+        let (to_truth, to_found) = (ascending(&samples(&a), &b), ascending(&samples(&b), &a));
+        let mean = |d: &[f64]| d.iter().sum::<f64>() / d.len() as f64;
+        let percentile_95 = |d: &[f64]| {
+            let at = 0.95 * (d.len() - 1) as f64;
+            let next = d[(at as usize + 1).min(d.len() - 1)];
+            d[at as usize] + at.fract() * (next - d[at as usize])
+        };
+        // Places of samples along 11 segments shorter than 174, rounded in another order.
+        let tolerance = rounding(11.0 * 174.0);
+        let near = |found: f64, expected: f64| (found - expected).abs() <= tolerance;
+        prop_assert!(near(scores.accuracy, mean(&to_truth)));
+        prop_assert!(near(scores.completeness, mean(&to_found)));
+        prop_assert!(near(scores.overall, (mean(&to_truth) + mean(&to_found)) / 2.0));
+        prop_assert!(near(scores.percentile_95, percentile_95(&to_truth).max(percentile_95(&to_found))));
+        let (farthest, lost) = (to_truth[to_truth.len() - 1], to_found[to_found.len() - 1]);
+        prop_assert!(near(scores.max_reconstruction_to_truth, farthest));
+        prop_assert!(near(scores.max_truth_to_reconstruction, lost));
+        prop_assert!(near(scores.hausdorff, farthest.max(lost)));
     }
 
     #[test]

@@ -114,6 +114,33 @@ fn one_huge_and_one_tiny_curve_stay_finite() {
 }
 
 #[test]
+fn finite_numbers_whose_scores_are_not_are_refused() {
+    let overflow = |error: EvalError| matches!(error, EvalError::Overflow { .. });
+    let span = |size: f64| [Point3::origin(), Point3::new(size, 0.0, 0.0)];
+    let error = curve_scores(&span(1e150), &span(1e-160), 1e150).unwrap_err();
+    assert!(overflow(error.clone()), "{error}");
+
+    let corners = |size: f64| {
+        [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]].map(|p| Point3::from(p) * size)
+    };
+    let (huge, tiny) = (corners(1e150), corners(1e-160));
+    let error = align_similarity(&tiny, &huge, None).unwrap_err();
+    assert!(overflow(error.clone()), "{error}");
+
+    // Depths next to 0 send images far away: further than the square of a number, or than a number.
+    let near = |depth: f64| [Point3::new(1.0, 0.0, depth), Point3::new(2.0, 0.0, depth)];
+    let k = Matrix3::new(2000.0, 0.0, 500.0, 0.0, 2000.0, 500.0, 0.0, 0.0, 1.0);
+    let size = ImageSize { width: 1000, height: 1000 };
+    let camera =
+        |x: f64| Camera::new(k, Matrix3::identity(), Vector3::new(x, 0.0, 0.0), size).unwrap();
+    let rig = Rig::new(camera(0.0), camera(5.0), LengthUnit::Millimetre).unwrap();
+    let error = reprojection_rms(&near(1e-200), &near(1.0), &rig, 1.0).unwrap_err();
+    assert!(overflow(error.clone()), "{error}");
+    let error = reprojection_rms(&near(1.0), &near(1e-320), &rig, 1.0).unwrap_err();
+    assert_eq!(error, EvalError::NotFinite { which: "truth", index: 0 });
+}
+
+#[test]
 fn points_on_a_line_fix_no_rotation() {
     let curve = line(9, 2.0);
     let error = align_similarity(&curve, &curve, None).unwrap_err();

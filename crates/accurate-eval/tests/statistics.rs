@@ -1,35 +1,10 @@
-//! Means, intervals, quantiles and summaries over cases.
+//! Means, intervals and quantiles over cases.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use accurate_eval::{
-    Case, CaseOutcome, DEFAULT_RESAMPLES, EvalError, TableScores, bootstrap_mean,
-    bounding_box_diagonal, fraction_below, median, penalised_means, quantile, summarise,
-    summarise_metric, wilson_interval,
+    DEFAULT_RESAMPLES, EvalError, bootstrap_mean, fraction_below, median, quantile, wilson_interval,
 };
-use accurate_geom::Point3;
 use proptest::prelude::*;
-
-fn scores(value: f64) -> TableScores {
-    TableScores {
-        accuracy: value,
-        completeness: 3.0 * value,
-        overall: 2.0 * value,
-        max_error: 9.0 * value,
-    }
-}
-
-fn scored(name: &str, value: f64) -> Case {
-    Case {
-        name: name.into(),
-        outcome: CaseOutcome::Scored(scores(value)),
-        truth_diagonal: Some(50.0),
-    }
-}
-
-fn failed(name: &str) -> Case {
-    let outcome = CaseOutcome::Failed { reason: "no endpoint".into() };
-    Case { name: name.into(), outcome, truth_diagonal: Some(100.0) }
-}
 
 proptest! {
     #[test]
@@ -75,42 +50,6 @@ proptest! {
             prop_assert!((left - right).abs() <= 64.0 * f64::EPSILON, "{left} {right}");
         }
     }
-
-    #[test]
-    fn failures_are_counted_and_change_no_mean(
-        values in prop::collection::vec(0.01..10.0_f64, 1..12), failures in 0..5_usize,
-    ) {
-        let good: Vec<Case> = values.iter().map(|v| scored("case", *v)).collect();
-        let mut all = good.clone();
-        all.extend((0..failures).map(|k| failed(&format!("bad_{k}"))));
-        let (of_good, of_all) = (summarise(&good, 200, "s").unwrap(), summarise(&all, 200, "s").unwrap());
-        prop_assert_eq!(of_all.metrics, of_good.metrics);
-        prop_assert_eq!((of_all.cases, of_all.scored(), of_all.failures.len()), (all.len(), good.len(), failures));
-        let metrics = of_all.metrics.unwrap();
-        prop_assert_eq!(metrics.overall.mean.n, good.len());
-        // The penalised mean is a number of its own: a failure costs the diagonal.
-        let penalised = penalised_means(&all).unwrap();
-        let expected = (values.iter().map(|v| 2.0 * v).sum::<f64>() + 100.0 * failures as f64) / all.len() as f64;
-        prop_assert!((penalised.overall - expected).abs() <= 32.0 * f64::EPSILON * expected);
-        prop_assert!(penalised.overall >= metrics.overall.mean.mean - 1e-12);
-    }
-}
-
-#[test]
-fn nothing_scored_is_none_and_not_zero() {
-    let summary = summarise(&[failed("a"), failed("b")], DEFAULT_RESAMPLES, "s").unwrap();
-    assert_eq!((summary.cases, summary.scored(), summary.metrics), (2, 0, None));
-    assert_eq!(summary.failures[1].case, "b");
-    assert_eq!(summary.failures[1].reason, "no endpoint");
-    assert_eq!(summarise(&[], 10, "s"), Err(EvalError::Empty { which: "cases" }));
-    let none = summarise_metric(&[failed("a")], |s| s.overall, 10, "s");
-    assert_eq!(none, Err(EvalError::Empty { which: "scored cases" }));
-    let mut unknown = failed("a");
-    unknown.truth_diagonal = None;
-    assert_eq!(penalised_means(&[unknown]), Err(EvalError::NoPenalty { case: "a".into() }));
-    assert_eq!(penalised_means(&[]), Err(EvalError::Empty { which: "cases" }));
-    let broken = penalised_means(&[scored("a", f64::NAN)]);
-    assert_eq!(broken, Err(EvalError::NotFinite { which: "cases", index: 0 }));
 }
 
 #[test]
@@ -166,12 +105,4 @@ fn numbers_that_are_no_numbers_are_refused() {
     assert!(matches!(bootstrap_mean(&[1.0], 0, "s"), Err(EvalError::InvalidArgument { .. })));
     assert!(matches!(bootstrap_mean(&[], 10, "s"), Err(EvalError::Empty { .. })));
     assert!(matches!(bootstrap_mean(&[1e308; 3], 10, "s"), Err(EvalError::NotFinite { .. })));
-}
-
-#[test]
-fn the_bounding_box_diagonal_is_that_of_the_extremes() {
-    let points =
-        [Point3::new(1.0, 9.0, 2.0), Point3::new(4.0, 5.0, 2.0), Point3::new(2.0, 6.0, 14.0)];
-    assert_eq!(bounding_box_diagonal(&points), Ok(13.0));
-    assert!(bounding_box_diagonal(&[]).is_err());
 }

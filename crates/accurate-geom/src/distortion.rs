@@ -112,8 +112,10 @@ impl Distortion {
 
     fn folds_before(&self, ideal: &Vector2<f64>) -> bool {
         (1..=FOLD_CHECKS).any(|i| {
-            let on_the_way = ideal * (i as f64 / FOLD_CHECKS as f64);
-            !(self.jacobian(&on_the_way).determinant() > 0.0)
+            let jacobian = self.jacobian(&(ideal * (i as f64 / FOLD_CHECKS as f64)));
+            // Beyond two folds both eigenvalues are below 0, and their product above it again. The
+            // Jacobian is symmetric, so that none is complex.
+            !(jacobian.determinant() > 0.0 && jacobian.trace() > 0.0)
         })
     }
 }

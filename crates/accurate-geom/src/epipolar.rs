@@ -23,20 +23,23 @@ pub struct Fundamental<A, B> {
 impl<A: View, B: View> Fundamental<A, B> {
     /// From the cameras of view `A` and view `B`. A zero baseline has no fundamental matrix; a
     /// [`Rig`](crate::Rig) has refused it already, hence crate-private.
-    pub(crate) fn from_cameras(camera_a: &Camera, camera_b: &Camera) -> Self {
+    ///
+    /// # Errors
+    /// As [`from_matrix`](Self::from_matrix): focal lengths may be so long that all entries vanish.
+    pub(crate) fn from_cameras(camera_a: &Camera, camera_b: &Camera) -> Result<Self, GeomError> {
         let a_from_b_rotation = camera_a.r() * camera_b.r_inverse();
         let a_from_b_translation = camera_a.t() - a_from_b_rotation * camera_b.t();
         let f = camera_a.k_inverse().transpose()
             * a_from_b_translation.cross_matrix()
             * a_from_b_rotation
             * camera_b.k_inverse();
-        Self { matrix: f / f.norm(), views: PhantomData }
+        Self::from_matrix(f)
     }
 
     /// From a 3 x 3 matrix with `p_aᵀ F p_b = 0`, of any scale.
     ///
     /// # Errors
-    /// [`GeomError::NotFinite`] if an entry is not finite or all are zero.
+    /// [`GeomError::NotFinite`] if an entry is not finite or all are zero, or their squares are.
     pub fn from_matrix(matrix: Matrix3<f64>) -> Result<Self, GeomError> {
         let norm = matrix.norm();
         if !norm.is_normal() {

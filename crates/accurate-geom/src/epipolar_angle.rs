@@ -2,6 +2,7 @@ use std::marker::PhantomData;
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+use crate::error::finite;
 use crate::{Camera, GeomError, Pixel, Rig, View, View1, View2};
 
 /// The least sine of the angle between a ray and the baseline at which its plane is defined.
@@ -59,7 +60,8 @@ impl EpipolarAngle {
     /// The angle of a pixel of view 1.
     ///
     /// # Errors
-    /// [`GeomError::AtEpipole`] if its ray runs along the baseline, [`GeomError::NotFinite`].
+    /// [`GeomError::AtEpipole`] if its ray runs along the baseline, [`GeomError::NotFinite`] if the
+    /// pixel is not finite or so far away that its ray is not.
     pub fn view1(&self, pixel: Pixel<View1>) -> Result<AngleSample, GeomError> {
         self.view1.sample(pixel)
     }
@@ -107,8 +109,10 @@ impl<V: View> AngleOfView<V> {
             });
         }
         let ray = self.components * pixel.homogeneous();
+        let length = ray.norm();
+        finite(length, || format!("length of the ray of a pixel of view {}", V::NUMBER))?;
         let across = (ray.x * ray.x + ray.y * ray.y).sqrt();
-        if !(across > LEAST_SINE * ray.norm()) {
+        if !(across > LEAST_SINE * length) {
             return Err(GeomError::AtEpipole { view: V::NUMBER, x: pixel.x, y: pixel.y });
         }
         // d atan2(b, a) = (a db - b da) / (a² + b²)

@@ -7,6 +7,9 @@ pub struct Rig {
     camera2: Camera,
     unit: LengthUnit,
     f12: Fundamental<View1, View2>,
+    /// The transpose of `f12` but for rounding. Made with it, so that [`swapped`](Self::swapped) has
+    /// nothing to refuse.
+    f12_of_swapped: Fundamental<View1, View2>,
 }
 
 impl Rig {
@@ -15,14 +18,16 @@ impl Rig {
     /// # Errors
     /// [`GeomError::ZeroBaseline`] if the centres are closer than 1e-9 of the longer translation:
     /// below that, rounding in `R` and `t` decides the direction of the baseline.
+    /// [`GeomError::NotFinite`] if the entries of `F` vanish or overflow.
     pub fn new(camera1: Camera, camera2: Camera, unit: LengthUnit) -> Result<Self, GeomError> {
         let distance = (camera1.centre() - camera2.centre()).norm();
         let scale = camera1.t().norm().max(camera2.t().norm());
         if !(distance > 1e-9 * scale) {
             return Err(GeomError::ZeroBaseline { distance, scale });
         }
-        let f12 = Fundamental::from_cameras(&camera1, &camera2);
-        Ok(Self { camera1, camera2, unit, f12 })
+        let f12 = Fundamental::from_cameras(&camera1, &camera2)?;
+        let f12_of_swapped = Fundamental::from_cameras(&camera2, &camera1)?;
+        Ok(Self { camera1, camera2, unit, f12, f12_of_swapped })
     }
 
     /// The camera of view 1.
@@ -51,14 +56,16 @@ impl Rig {
             camera1: self.camera2.clone(),
             camera2: self.camera1.clone(),
             unit: self.unit,
-            f12: Fundamental::from_cameras(&self.camera2, &self.camera1),
+            f12: self.f12_of_swapped,
+            f12_of_swapped: self.f12,
         }
     }
 
     /// Both images of a world point.
     ///
     /// # Errors
-    /// [`GeomError::NotInFront`] if it is behind one of the cameras.
+    /// [`GeomError::NotInFront`] if it is behind one of the cameras. As [`Camera::project`], it does
+    /// not look for images that overflow.
     pub fn project(&self, point: &Point3) -> Result<(Pixel<View1>, Pixel<View2>), GeomError> {
         Ok((self.camera1.project(point)?.into(), self.camera2.project(point)?.into()))
     }

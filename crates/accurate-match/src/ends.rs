@@ -6,6 +6,11 @@ use crate::MatchError;
 ///
 /// 0 says that the end is seen in the other view too; infinity that the other view may see any part
 /// of the curve.
+///
+/// The length bounds what an alignment leaves out. [`FreeMatcher`](crate::FreeMatcher) may then leave
+/// out more at an end that is not 0, whatever its length: where the path ends with the other view
+/// standing still, the points matched with that one point that are worse than the best of them by more
+/// than [`FreeMatchParams::end_run_px`](crate::FreeMatchParams::end_run_px).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FreeEnds {
     /// From the first point on, px.

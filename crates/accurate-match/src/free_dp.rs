@@ -86,8 +86,9 @@ pub struct FreeAlignment {
 /// both, so that two gaps never touch. `fill_row(i, row)` writes the costs of row `i`, each called
 /// once, in order; costs may not be negative or NaN; infinity forbids a match.
 ///
-/// Among equals the path prefers, going back: both advance, view 1 advances, view 2 advances, a gap
-/// in view 1, a gap in view 2, the begin; the first end found in column, then row order.
+/// Among equals the path prefers, going back: both advance from a match, out of a gap in view 1, out
+/// of a gap in view 2; then view 1 advances, view 2 advances, the begin. Of gaps that cost the same it
+/// takes the shortest, of ends the topmost in the last column, then the leftmost in the last row.
 ///
 /// # Errors
 /// As [`align_rows`](crate::align_rows), with [`MatchError::InvalidCost`] for negative costs too;
@@ -309,7 +310,7 @@ fn first_row(
         let left = if j > 0 { current.matched[j - 1] } else { f64::INFINITY };
         let from_left = left + costs[j] + prices.step;
         (current.matched[j], codes[j]) =
-            if from_left < begun { (from_left, LEFT) } else { (begun, START) };
+            if from_left <= begun { (from_left, LEFT) } else { (begun, START) };
         if gaps && j > 0 {
             let opened = left + prices.gap_open + prices.gap_skip;
             let gone_on = current.gap2[j - 1] + prices.gap_skip;

@@ -26,7 +26,8 @@ pub struct FreeMatchParams {
     /// How much of the curve of view 2 may be unseen in view 1; begin and end as the curve is given.
     pub free2: FreeEnds,
     /// At a free end where one view stands still at its last point while the other goes on, points
-    /// whose distance exceeds the least by more than this, px, are left out. 0.3: one σ.
+    /// whose distance exceeds the least by more than this, px, are left out, also beyond the free
+    /// length. 0.3: one σ.
     pub end_run_px: f64,
     /// Whether only the neighbourhood of a first, coarse path is looked at: many times as fast, and most
     /// often the same. Not for closed curves. No.
@@ -431,7 +432,10 @@ fn samples_within<V: View>(curve: &[Pixel<V>], free: FreeEnds) -> (usize, usize)
 }
 
 /// Where a path that may end earlier ends with one view standing still, at most one of those pairs
-/// is right: leaves out what lies beyond the pairs that are as good as the best.
+/// is right: leaves out what lies beyond the pairs that are as good as the best, within `slack_px`.
+///
+/// Of `ends` it only asks whether the view that goes on is free there at all: a run may be left out on
+/// top of, and far longer than, the samples that the alignment was allowed to skip.
 fn trim_end_runs(
     path: &[(usize, usize)],
     costs: &CostModel,

@@ -321,6 +321,40 @@ fn a_stretch_that_one_sequence_lacks_is_a_gap() {
     assert!((found.total_cost - (0.5 + 3.0 * 0.1)).abs() < ROUNDING);
 }
 
+/// Everything is free, so that only the order of equals decides.
+const TIED: MovePrices =
+    MovePrices { diagonal_weight: 1.0, step: 0.0, end_skip: 0.0, gap_open: 0.0, gap_skip: 0.0 };
+
+#[test]
+fn of_equals_a_gap_comes_before_an_advance_of_one_view() {
+    let m = Matrix { n1: 3, n2: 2, cells: vec![0.0, 0.0, 5.0, 0.0, 0.0, 0.0] };
+    let found = m.align(&TIED, &OpenEnds::NONE).unwrap();
+    assert_eq!((found.total_cost, found.path), (0.0, vec![(0, 0), (2, 1)]));
+    let transposed = m.map(2, 3, |i, j| (j, i)).align(&TIED, &OpenEnds::NONE).unwrap();
+    assert_eq!((transposed.total_cost, transposed.path), (0.0, vec![(0, 0), (1, 2)]));
+    // Without gaps, both advance, then view 1.
+    let shut = MovePrices { gap_open: f64::INFINITY, ..TIED };
+    let found = m.align(&shut, &OpenEnds::NONE).unwrap();
+    assert_eq!(found.path, [(0, 0), (1, 1), (2, 1)]);
+}
+
+#[test]
+fn of_equals_an_advance_comes_before_a_later_begin_in_either_view() {
+    let row = Matrix { n1: 1, n2: 3, cells: vec![0.0; 3] };
+    let column = row.map(3, 1, |i, j| (j, i));
+    let ends = OpenEnds { end1: 0, end2: 0, ..OpenEnds::ANY };
+    assert_eq!(row.align(&TIED, &ends).unwrap().path, [(0, 0), (0, 1), (0, 2)]);
+    assert_eq!(column.align(&TIED, &ends).unwrap().path, [(0, 0), (1, 0), (2, 0)]);
+}
+
+#[test]
+fn of_equal_ends_the_topmost_in_the_last_column_comes_first() {
+    let m = Matrix { n1: 2, n2: 2, cells: vec![0.0; 4] };
+    assert_eq!(m.align(&TIED, &OpenEnds::ANY).unwrap().path, [(0, 0), (0, 1)]);
+    let m = Matrix { n1: 2, n2: 3, cells: vec![0.0, 0.0, 1.0, 0.0, 0.0, 1.0] };
+    assert_eq!(m.align(&TIED, &OpenEnds::ANY).unwrap().path.last(), Some(&(1, 0)));
+}
+
 #[test]
 fn unusable_input_is_refused_by_name() {
     let run = |n1, n2, value: f64, prices: &MovePrices| {

@@ -5,7 +5,8 @@ mod scenes;
 
 use std::path::{Path, PathBuf};
 
-use accurate_geom::{GeomError, Pixel, Point3, Rig, View1, View2};
+use accurate_geom::nalgebra::{Matrix3, Vector3};
+use accurate_geom::{Camera, GeomError, ImageSize, LengthUnit, Pixel, Point3, Rig, View1, View2};
 use accurate_io::{PairParts, find_pairs, read_pair};
 use accurate_match::{
     CostModel, CurveMatcher, DistanceKind, Ecdp, FreeEnds, FreeMatch, FreeMatchParams, FreeMatcher,
@@ -223,6 +224,20 @@ proptest! {
         }
     }
 
+    /// Where the angle rises all the way, the epipolar line of almost every point crosses the other
+    /// curve between two of its samples, here a few px apart at most.
+    #[test]
+    fn crossings_of_a_rising_curve_are_exact(
+        rig in rigs(), helix in rising(), n1 in 150..400_usize, n2 in 150..400_usize
+    ) {
+        prop_assume!(n1 != n2);
+        let (c1, c2) = (view1(&rig, &points(&helix, n1)), view2(&rig, &points(&helix, n2)));
+        let found = matched(&c1, &c2, &rig, &TRUSTING);
+        let exact = found.flags.iter().filter(|flag| **flag == PointFlag::Exact).count();
+        prop_assert!(found.matched1.len() > n1 / 2);
+        prop_assert!(10 * exact > 9 * found.flags.len(), "{exact} of {}", found.flags.len());
+    }
+
     #[test]
     fn a_closed_curve_comes_back_wherever_it_is_cut(
         rig in rigs(), n in 12..60_usize, cut1 in 0..60_usize, cut2 in 0..60_usize, backwards: bool, tilt in 0.3..1.2_f64
@@ -301,6 +316,37 @@ fn free_lengths_are_kept() {
     assert_eq!(free(FreeEnds { begin_px: 0.0, end_px: f64::INFINITY }).start, 0);
     let some: f64 = c1[..6].windows(2).map(|w| w[0].distance(w[1])).sum();
     assert_eq!(free(FreeEnds { begin_px: some + 1e-6, end_px: 0.0 }).start, 5);
+}
+
+/// View 2 goes on for 20 samples, of which 4 may be left out. The path leaves out those 4 and matches 16
+/// with the last point of view 1; of these all but the few within the slack are left out as well.
+#[test]
+fn a_run_at_a_free_end_is_left_out_beyond_the_free_length() {
+    let k = Matrix3::new(1000.0, 0.0, 256.0, 0.0, 1000.0, 256.0, 0.0, 0.0, 1.0);
+    let size = ImageSize { width: 512, height: 512 };
+    let camera =
+        |x: f64| Camera::new(k, Matrix3::identity(), Vector3::new(x, 0.0, 0.0), size).unwrap();
+    // Epipolar lines are rows. Samples are 1 px apart along the curves and 0.1 px across the lines.
+    let rig = Rig::new(camera(0.0), camera(-10.0), LengthUnit::Unit).unwrap();
+    let at = |k: u32| (0.99_f64.sqrt() * f64::from(k), 0.1 * f64::from(k));
+    let c1: Vec<_> = (0..60).map(|k| Pixel::new(300.0 + at(k).0, 200.0 + at(k).1)).collect();
+    let c2: Vec<_> = (0..80).map(|k| Pixel::new(200.0 + at(k).0, 200.0 + at(k).1)).collect();
+    let params = FreeMatchParams {
+        prices: MovePrices { end_skip: 0.06, ..TRUSTING.prices },
+        free1: FreeEnds::NONE,
+        free2: FreeEnds { begin_px: 0.0, end_px: 4.5 },
+        ..TRUSTING
+    };
+    let matched2 = |end_run_px: f64| {
+        let params = FreeMatchParams { end_run_px, ..params };
+        let found = FreeMatcher::new(params).match_directed(&c1, &c2, false, &rig).unwrap();
+        assert_eq!(found.matched1, 0..60);
+        found.matched2
+    };
+    assert_eq!(matched2(f64::INFINITY), 0..76);
+    // Each sample is 0.1 / √2 px farther from its line by Sampson's measure: four lie within 0.3 px.
+    assert_eq!(matched2(0.3), 0..64);
+    assert_eq!(matched2(0.0), 0..60);
 }
 
 #[test]

@@ -3,10 +3,13 @@
 
 mod scenes;
 
-use accurate_geom::{EpipolarAngle, GeomError, Pixel, View, View1, View2};
+use accurate_geom::nalgebra::{Matrix3, Vector3};
+use accurate_geom::{
+    Camera, EpipolarAngle, GeomError, ImageSize, LengthUnit, Pixel, Rig, View, View1, View2,
+};
 use accurate_match::{
     AngleProfile, AngleSignal, FreeEnds, IntervalPrices, MatchError, MovePrices, OpenEnds,
-    ProposeParams, SignalCurve, align_free, interval_energy, propose_pairs,
+    Proposal, ProposeParams, SignalCurve, align_free, interval_energy, propose_pairs,
 };
 use proptest::prelude::*;
 use scenes::{curves, rigs};
@@ -76,6 +79,43 @@ fn brute_force(
         }
     }
     best
+}
+
+/// What ends that differ cost, as documented, from the angles of the end points themselves; `None`
+/// if both differ by more than the limit.
+fn end_penalty(
+    angles: &EpipolarAngle,
+    c1: &SignalCurve<'_, View1>,
+    c2: &SignalCurve<'_, View2>,
+    reversed: bool,
+    params: &ProposeParams,
+) -> Option<f64> {
+    let view1 = |p: Option<&Pixel<View1>>| angles.view1(*p.unwrap()).unwrap();
+    let view2 = |p: Option<&Pixel<View2>>| angles.view2(*p.unwrap()).unwrap();
+    let (begin1, end1) = (view1(c1.points.first()), view1(c1.points.last()));
+    let (mut begin2, mut end2) = (view2(c2.points.first()), view2(c2.points.last()));
+    let mut free2 = c2.free;
+    if reversed {
+        (begin2, end2) = (end2, begin2);
+        free2 = free2.reversed();
+    }
+    let mut differences = Vec::new();
+    for (a, b, free) in [
+        (begin1, begin2, c1.free.begin_px.max(free2.begin_px)),
+        (end1, end2, c1.free.end_px.max(free2.end_px)),
+    ] {
+        if free == 0.0 {
+            let turn = std::f64::consts::TAU;
+            let apart = (a.phi - b.phi).abs();
+            let apart = apart.min(turn - apart);
+            differences.push(2.0_f64.sqrt() * apart / a.gradient_per_px.hypot(b.gradient_per_px));
+        }
+    }
+    if differences.iter().filter(|px| **px > params.end_limit_px).count() == 2 {
+        return None;
+    }
+    let sum: f64 = differences.iter().map(|px| px.min(params.end_limit_px)).sum();
+    Some(params.end_weight * (sum - params.end_tolerance_px).max(0.0))
 }
 
 /// Rounding of angles to f32 (0.01 · 2⁻²⁴ radians at 1/0.0005 px per radian), and ten f32 operations
@@ -174,20 +214,51 @@ proptest! {
         rig in rigs(),
         curves1 in prop::collection::vec((curves::<View1>(20..=60), 0.0..1.0_f64, free_ends()), 1..=5),
         curves2 in prop::collection::vec((curves::<View2>(20..=60), 0.0..1.0_f64, free_ends()), 1..=5),
-        keep_coarse in 1..30_usize, keep_fine in 1..20_usize,
+        keep_screened in 1..30_usize, keep_coarse in 1..30_usize, keep_fine in 1..20_usize,
+        end_limit_px in 20.0..400.0_f64,
     ) {
         let angles = EpipolarAngle::new(&rig);
         fn signal_curve<V: View>((points, cost, free): &(Vec<Pixel<V>>, f64, FreeEnds)) -> SignalCurve<'_, V> {
             SignalCurve { points, cost: *cost, free: *free }
         }
         let (c1, c2): (Vec<_>, Vec<_>) = (curves1.iter().map(signal_curve).collect(), curves2.iter().map(signal_curve).collect());
-        let params = ProposeParams { keep_coarse, keep_fine, end_limit_px: 1e4, end_weight: 0.01, ..ProposeParams::DEFAULT };
+        let params = ProposeParams {
+            keep_screened, keep_coarse, keep_fine, end_limit_px, end_weight: 0.01, ..ProposeParams::DEFAULT
+        };
         let found = propose_pairs(&angles, &c1, &c2, &params).unwrap();
 
         // Every pair, nothing abandoned, one at a time.
-        let everything = ProposeParams { energy_weight: 0.0, keep_coarse: usize::MAX, keep_fine: usize::MAX, ..params };
+        let keep_all = usize::MAX;
+        let everything = ProposeParams {
+            energy_weight: 0.0, keep_screened: keep_all, keep_coarse: keep_all, keep_fine: keep_all, ..params
+        };
         let mut pairs = propose_pairs(&angles, &c1, &c2, &everything).unwrap();
-        prop_assert_eq!(pairs.len(), 2 * c1.len() * c2.len());
+        pairs.sort_by_key(|p| (p.i, p.j, p.reversed));
+        let mut expected = Vec::new();
+        for (i, c1) in c1.iter().enumerate() {
+            for (j, c2) in c2.iter().enumerate() {
+                for reversed in [false, true] {
+                    if let Some(penalty) = end_penalty(&angles, c1, c2, reversed, &params) {
+                        expected.push(((i, j, reversed), penalty));
+                    }
+                }
+            }
+        }
+        prop_assert_eq!(pairs.len(), expected.len());
+        for (p, (ids, penalty)) in pairs.iter().zip(expected) {
+            prop_assert_eq!((p.i, p.j, p.reversed), ids);
+            // The last sample of a profile is its last point but for rounding: 1e-12 px, of which
+            // angles far from the epipole keep all but a few digits.
+            prop_assert!((p.end_penalty - penalty).abs() <= 1e-9, "{} {}", p.end_penalty, penalty);
+        }
+        let best = |pairs: &mut Vec<Proposal>, keep: usize| {
+            pairs.sort_by(|a, b| a.score.total_cmp(&b.score).then((a.i, a.j, a.reversed).cmp(&(b.i, b.j, b.reversed))));
+            pairs.truncate(keep);
+        };
+        for p in &mut pairs {
+            p.score = c1[p.i].cost + c2[p.j].cost + p.end_penalty;
+        }
+        best(&mut pairs, keep_screened);
         for (step, keep) in [(params.coarse_step_px, keep_coarse), (params.fine_step_px, keep_fine)] {
             for p in &mut pairs {
                 let s1 = AngleProfile::of_view1(&angles, c1[p.i].points, params.fine_step_px).unwrap().signal(step).unwrap();
@@ -195,10 +266,35 @@ proptest! {
                 p.energy_px2 = interval_energy(&s1, c1[p.i].free, &s2, c2[p.j].free, p.reversed, &params.prices).unwrap();
                 p.score = c1[p.i].cost + c2[p.j].cost + p.end_penalty + params.energy_weight * p.energy_px2;
             }
-            pairs.sort_by(|a, b| a.score.total_cmp(&b.score).then((a.i, a.j, a.reversed).cmp(&(b.i, b.j, b.reversed))));
-            pairs.truncate(keep);
+            best(&mut pairs, keep);
         }
         prop_assert_eq!(found, pairs);
+    }
+}
+
+/// Around an epipole inside the image the plane turns as the pixel does: past ±π, where the angle of a
+/// single pixel starts again, that of a curve goes on.
+#[test]
+fn the_angle_goes_on_past_half_a_turn() {
+    let k = Matrix3::new(800.0, 0.0, 256.0, 0.0, 800.0, 256.0, 0.0, 0.0, 1.0);
+    let size = ImageSize { width: 512, height: 512 };
+    let camera =
+        |z: f64| Camera::new(k, Matrix3::identity(), Vector3::new(0.0, 0.0, z), size).unwrap();
+    let rig = Rig::new(camera(0.0), camera(50.0), LengthUnit::Millimetre).unwrap();
+    let turns = 1.25;
+    let around = |k: i32| {
+        let angle = turns * std::f64::consts::TAU * f64::from(k) / 500.0;
+        Pixel::new(256.0 + 100.0 * angle.cos(), 256.0 + 100.0 * angle.sin())
+    };
+    let curve: Vec<Pixel<View1>> = (0..=500).map(around).collect();
+    let profile = AngleProfile::of_view1(&EpipolarAngle::new(&rig), &curve, 1.0).unwrap();
+    let turned = (profile.last().0 - profile.first().0).abs();
+    assert!((turned - turns * std::f64::consts::TAU).abs() < 1e-9, "{turned}");
+    // 785 px in steps of 5: no sample covers more angle than two of its own steps.
+    let signal = profile.signal(5.0).unwrap();
+    for k in 0..signal.samples() {
+        let (low, high) = signal.interval(k).unwrap();
+        assert!(high - low < 0.1, "{low} {high}");
     }
 }
 

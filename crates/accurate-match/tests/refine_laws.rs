@@ -184,13 +184,32 @@ proptest! {
     }
 
     #[test]
-    fn the_rules_agree_where_the_signed_one_moves(case in cases()) {
+    fn the_signed_rule_is_the_papers_where_the_neighbour_lies_beyond_the_line(case in cases()) {
+        let costs = case.costs();
         let direction = RefineDirections::Horizontal;
-        let paper = refine(&case.path, &case.costs(), RefineRule::Paper, direction);
-        let signed = refine(&case.path, &case.costs(), RefineRule::Signed, direction);
-        for (paper, signed) in paper.iter().zip(&signed) {
-            let unmoved = case.curve1[signed.cell.0];
-            prop_assert!(signed.pixel1 == unmoved || signed.pixel1 == paper.pixel1);
+        let paper = refine(&case.path, &costs, RefineRule::Paper, direction);
+        let signed = refine(&case.path, &costs, RefineRule::Signed, direction);
+        for run in horizontal_runs(&case.path) {
+            let i = case.path[run.start].0;
+            let at = |i: usize, k: usize| costs.signed_distance_in_view1(i, case.path[k].1).unwrap();
+            let mut anchor = run.start;
+            for k in run.clone() {
+                if at(i, k).abs() < at(i, anchor).abs() {
+                    anchor = k;
+                }
+            }
+            for k in run {
+                let neighbour = if k < anchor { i.checked_sub(1) } else { Some(i + 1) };
+                let neighbour = neighbour.filter(|&n| k != anchor && n < case.curve1.len());
+                let unmoved = case.curve1[i];
+                match neighbour {
+                    Some(n) if at(i, k).abs() > ON_LINE_PX && at(i, k) * at(n, k) <= 0.0 => {
+                        prop_assert_eq!(signed[k].pixel1, paper[k].pixel1);
+                        prop_assert!(signed[k].pixel1 != unmoved);
+                    }
+                    _ => prop_assert_eq!(signed[k].pixel1, unmoved),
+                }
+            }
         }
     }
 
@@ -284,6 +303,22 @@ fn a_point_on_the_line_stays_even_if_it_is_not_the_anchor() {
     assert_eq!(pairs[0].pixel1, curve1[1]);
     assert_eq!(pairs[1].pixel1, curve1[1]);
     assert!(pairs[2].pixel1 != curve1[1]);
+}
+
+#[test]
+fn the_signed_rule_moves_a_point_whose_neighbour_lies_beyond_the_line() {
+    let rig = turntable();
+    let curve1 = [Pixel::new(500.0, 511.0), Pixel::new(500.0, 512.0), Pixel::new(500.0, 513.0)];
+    // The line of the second point of view 2 passes between the last two of view 1.
+    let curve2 = [Pixel::new(451.0, 512.0), Pixel::new(452.0, 511.4)];
+    let costs = CostModel::new(rig.fundamental(), &curve1, &curve2, DistanceKind::View1).unwrap();
+    let signed = |i| costs.signed_distance_in_view1(i, 1).unwrap();
+    assert!(signed(1) * signed(2) < 0.0);
+    let [paper, signed] = RULES.map(|rule| {
+        refine(&[(1, 0), (1, 1)], &costs, rule, RefineDirections::Horizontal)[1].pixel1
+    });
+    assert_eq!(signed, paper);
+    assert!(signed != curve1[1]);
 }
 
 #[test]

@@ -91,3 +91,12 @@ fn a_point_beyond_the_fold_is_refused() {
     assert!(camera.undistort(&Point2::new(0.38, 0.0)).is_ok());
     assert!(camera.undistort(&Point2::new(0.5, 0.0)).is_err());
 }
+
+/// 20 (1 - 20²) = -7980: from r = 1 on the image is turned round as well, and nothing looks folded there.
+#[test]
+fn a_point_beyond_both_folds_is_refused() {
+    let lens = Distortion { k1: -1.0, ..Distortion::default() };
+    let error =
+        camera(Matrix3::identity(), lens).undistort(&Point2::new(-7980.0, 0.0)).unwrap_err();
+    assert_eq!(error, GeomError::DistortionFolds { x: -7980.0, y: 0.0 });
+}

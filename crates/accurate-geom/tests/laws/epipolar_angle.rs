@@ -77,6 +77,18 @@ fn the_epipole_has_no_angle() {
     assert!(angle.view2(Pixel::new(f64::NAN, 0.0)).is_err());
 }
 
+/// The square of its length would overflow, and an infinite ray runs along anything.
+#[test]
+fn a_pixel_too_far_away_is_no_epipole() {
+    let angle = EpipolarAngle::new(&turntable_rig());
+    for far in [1e160, -1e300] {
+        let error = angle.view1(Pixel::new(far, 0.0)).unwrap_err();
+        assert!(matches!(error, GeomError::NotFinite { .. }), "{error}");
+        let error = angle.view2(Pixel::new(0.0, far)).unwrap_err();
+        assert!(matches!(error, GeomError::NotFinite { .. }), "{error}");
+    }
+}
+
 /// Both cameras look along the baseline: no direction is better than another, none may be NaN.
 #[test]
 fn forward_motion_still_has_angles() {

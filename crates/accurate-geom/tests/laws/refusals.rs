@@ -85,6 +85,15 @@ fn a_rig_refuses_a_zero_baseline() {
 }
 
 #[test]
+fn a_rig_refuses_focal_lengths_without_a_fundamental_matrix() {
+    let k = Matrix3::new(1e165, 0.0, 0.0, 0.0, 1e165, 0.0, 0.0, 0.0, 1.0);
+    let camera =
+        |x: f64| Camera::new(k, Matrix3::identity(), Vector3::new(x, 0.0, 0.0), SIZE).unwrap();
+    let error = Rig::new(camera(0.0), camera(50.0), LengthUnit::Unit).unwrap_err();
+    assert!(matches!(error, GeomError::NotFinite { .. }), "{error}");
+}
+
+#[test]
 fn a_point_behind_a_camera_has_no_image() {
     let camera = camera(Vector3::zeros());
     for z in [-1.0, 0.0, f64::NAN] {

@@ -211,6 +211,38 @@ fn names_of_methods_round_trip() {
     assert_eq!("best".parse::<Triangulation>(), Err(UnknownTriangulation("best".into())));
 }
 
+proptest! {
+    /// One camera straight behind the other: the rays of the epipoles, the principal points, meet every
+    /// other ray in a camera centre.
+    #[test]
+    fn the_epipole_shows_no_point(x in 0.0..512.0_f64, y in 0.0..512.0_f64) {
+        use accurate_geom::nalgebra::{Matrix3, Vector3};
+        use accurate_geom::{Camera, ImageSize, LengthUnit};
+        prop_assume!((x - 256.0).hypot(y - 256.0) > 1e-3);
+        let k = Matrix3::new(1200.0, 0.0, 256.0, 0.0, -1200.0, 256.0, 0.0, 0.0, 1.0);
+        let size = ImageSize { width: 512, height: 512 };
+        let camera =
+            |z| Camera::new(k, Matrix3::identity(), Vector3::new(0.0, 0.0, z), size).unwrap();
+        let rig = Rig::new(camera(0.0), camera(50.0), LengthUnit::Millimetre).unwrap();
+        let pairs = [
+            (Pixel::new(256.0, 256.0), Pixel::new(x, y)),
+            (Pixel::new(x, y), Pixel::new(256.0, 256.0)),
+        ];
+        let refused = [1, 2].map(|view| GeomError::AtEpipole { view, x: 256.0, y: 256.0 });
+        // Gauss-Newton asks for a start, and gets none either.
+        for method in Triangulation::ALL {
+            let triangulator = Triangulator::new(&rig, method);
+            for (k, (p1, p2)) in pairs.into_iter().enumerate() {
+                prop_assert_eq!(triangulator.triangulate(p1, p2), Err(refused[k].clone()), "{}", method);
+            }
+            let found = triangulator.triangulate_all(pairs);
+            prop_assert!(found.points.is_empty());
+            let failures: Vec<_> = refused.iter().cloned().enumerate().collect();
+            prop_assert_eq!(found.failures, failures, "{}", method);
+        }
+    }
+}
+
 /// Two parallel cameras: the simplest rig with rays that do not meet.
 fn fixed_scene() -> Rig {
     use accurate_geom::nalgebra::{Matrix3, Vector3};
