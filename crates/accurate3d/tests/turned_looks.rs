@@ -6,11 +6,11 @@ use accurate3d::geom::{Pixel, View1};
 use accurate3d::synth::{CaseOptions, Family, generate};
 use accurate3d::{InputKind, Method, Params, Reconstruction, ViewPair, reconstruct};
 
-/// Upright, no pair of walks comes near the truth (off by 7.7 px, and in doubt); turned, one does (0.6
+/// Upright, no pair of walks comes near the truth (off by 7.2 px, and in doubt); turned, one does (1.8
 /// px).
 #[test]
 fn a_curve_that_no_upright_walk_leads_to_is_found_turned() {
-    let case = generate(Family::Carm, 1205, 13, &CaseOptions::default()).unwrap();
+    let case = generate(Family::Carm, 1205, 25, &CaseOptions::default()).unwrap();
     let (truth, camera) = (case.truth.clone(), case.rig.camera1().clone());
     let depth = truth.iter().map(|p| camera.depth(p)).sum::<f64>() / truth.len() as f64;
     let per_px = depth / camera.k()[(0, 0)].abs();
