@@ -14,7 +14,7 @@ pub struct ModelArgs {
     /// Library of ONNX Runtime, libonnxruntime.so.* (default: the variable ORT_DYLIB_PATH).
     #[arg(long, value_name = "LIBRARY")]
     pub onnxruntime: Option<PathBuf>,
-    /// Which mirror images of an image the network sees as well.
+    /// Which mirror images of an image the network sees as well; in doubt `reconstruct` takes all.
     #[arg(long, value_enum, default_value_t = Mirror::Opposite)]
     pub mirror: Mirror,
 }
