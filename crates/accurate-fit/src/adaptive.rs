@@ -169,22 +169,21 @@ fn surprise(
     // What no third difference holds is where the curve begins, in which direction and how bent: nine
     // unknowns of the body, spread evenly, whatever the distance h of the knots. In the first control
     // points, whose differences are h and h² times those, their density is that of h^-9.
-    let spacing_px = spline.length(8) * problem.px_per_unit / spline.spans() as f64;
-    let free = 18.0 * spacing_px.ln();
+    let free = 18.0 * spline.spacing_px(problem.px_per_unit).ln();
     cost / variance + unused + free + occam(inverse, unknowns, variance, settings.lambda3, factors)
 }
 
 /// What [`smooth`] did.
-pub(crate) struct Smoothed {
-    pub(crate) steps: usize,
+struct Smoothed {
+    steps: usize,
     /// Of the final normal matrix ...
-    pub(crate) inverse: SelectedInverse,
+    inverse: SelectedInverse,
     /// ... and what it was assembled under.
     settings: Settings,
 }
 
 /// Alternates smoothness and curve.
-pub(crate) fn smooth(
+fn smooth(
     minimiser: &mut Minimiser<'_>,
     params: &OutlineFitParams,
     adaptive: &AdaptiveParams,
@@ -221,7 +220,7 @@ fn alternate(
     const REST: f64 = 0.1;
     let spline = &minimiser.current.state.spline;
     let windows = spline.control.len() - 3;
-    let spacing_px = spline.length(8) * minimiser.problem.px_per_unit / spline.spans() as f64;
+    let spacing_px = spline.spacing_px(minimiser.problem.px_per_unit);
     let pool = Pool::new(adaptive.window_px / spacing_px, windows);
     let variance = adaptive.variance_px2();
     let mut factors = vec![1.0; windows];

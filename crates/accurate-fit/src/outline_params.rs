@@ -135,8 +135,7 @@ pub(crate) struct SmoothnessScale {
 
 impl SmoothnessScale {
     pub(crate) fn new(spline: &UniformSpline, px_per_unit: f64) -> Self {
-        let spacing_px = spline.length(8) * px_per_unit / spline.spans() as f64;
-        let ratio = 10.0 / spacing_px;
+        let ratio = 10.0 / spline.spacing_px(px_per_unit);
         let unit = px_per_unit * px_per_unit;
         Self { second: unit * ratio.powi(3), third: unit * ratio.powi(5) }
     }

@@ -54,6 +54,11 @@ impl UniformSpline {
         self.control.len() - 3
     }
 
+    /// Mean length of a span: the distance of the knots along the curve, px.
+    pub(crate) fn spacing_px(&self, px_per_unit: f64) -> f64 {
+        self.length(8) * px_per_unit / self.spans() as f64
+    }
+
     /// Span and offset of the parameter `u`, which is first cut to the curve.
     #[inline]
     pub(crate) fn locate(&self, u: f64) -> (usize, f64) {

@@ -45,25 +45,20 @@ pub fn reconstruct_images(
         // Nothing found: the first look is all there is.
         Err(_) => return first.map(|curve| (curve, None)),
     };
-    match (first, reconstruct(&again, params)) {
+    let (mut curve, taken, apart_px) = match (first, reconstruct(&again, params)) {
         (Ok(first), Ok(second)) => {
             let apart_px = apart_px(&first, &second, pair);
             let taken = cost(&second) < cost(&first);
             let mut curve = if taken { second } else { first };
             doubt(&mut curve, apart_px);
-            curve.diagnostics.careful_look = Some(CarefulLook { taken, apart_px });
-            Ok((curve, taken.then_some(again)))
+            (curve, taken, apart_px)
         }
-        (Ok(mut curve), Err(_)) => {
-            curve.diagnostics.careful_look = Some(CarefulLook { taken: false, apart_px: None });
-            Ok((curve, None))
-        }
-        (Err(_), Ok(mut curve)) => {
-            curve.diagnostics.careful_look = Some(CarefulLook { taken: true, apart_px: None });
-            Ok((curve, Some(again)))
-        }
-        (Err(error), Err(_)) => Err(error),
-    }
+        (Ok(first), Err(_)) => (first, false, None),
+        (Err(_), Ok(second)) => (second, true, None),
+        (Err(error), Err(_)) => return Err(error),
+    };
+    curve.diagnostics.careful_look = Some(CarefulLook { taken, apart_px });
+    Ok((curve, taken.then_some(again)))
 }
 
 /// Noise and depth that is weakly seen stay with any segmentation.
@@ -107,10 +102,10 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     use accurate_seg::{Mask, Progress, Segmentation, unwatched};
-    use accurate_synth::{CaseOptions, Family, SynthCase, generate};
     use ndarray::Array2;
 
     use super::*;
+    use crate::segment::tests::case;
 
     /// Reads the body off an image that shows nothing else, but in view 1, which it is asked for first, some
     /// rows too high.
@@ -171,15 +166,6 @@ mod tests {
         fn describe(&self) -> String {
             self.0.describe()
         }
-    }
-
-    /// The masks as images.
-    fn case() -> (SynthCase, ViewPair) {
-        let case = generate(Family::Easy, 1000, 0, &CaseOptions::default()).unwrap();
-        let mut pair = ViewPair::from(case.clone());
-        pair.images = Some(case.masks.clone().map(|m| m.mapv(|body| f32::from(u8::from(!body)))));
-        pair.masks = None;
-        (case, pair)
     }
 
     const FAR_ROWS: usize = 12;

@@ -45,7 +45,7 @@ fn same_shape(image: &Array2<f32>, found: &Segmentation) -> Result<(), SegError>
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::ops::ControlFlow;
 
     use accurate_eval::curve_scores;
@@ -81,7 +81,8 @@ mod tests {
         }
     }
 
-    fn case() -> (SynthCase, ViewPair) {
+    /// A case, and its pair with the masks as images in their place.
+    pub(crate) fn case() -> (SynthCase, ViewPair) {
         let case = generate(Family::Easy, 1000, 0, &CaseOptions::default()).unwrap();
         let mut pair = ViewPair::from(case.clone());
         pair.images = Some(case.masks.clone().map(|m| m.mapv(|body| f32::from(u8::from(!body)))));

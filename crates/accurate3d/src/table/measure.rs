@@ -193,7 +193,8 @@ const NOT_SEGMENTED: &str = "ask for --input image";
 /// Measures every row on every case; the same numbers for any number of threads.
 ///
 /// The images of generated cases are X-ray pictures with the default options; each is segmented
-/// once for all rows. `on_case` is called when a case is done.
+/// once for all rows, and once more where `accurate` mode doubts its curve. `on_case` is called when
+/// a case is done.
 ///
 /// # Errors
 /// [`Error::Synthesis`] if a case cannot be generated, [`Error::Scoring`] if a mean cannot be formed.
