@@ -3,6 +3,7 @@
 //! - [`binarise_fixed`], [`binarise_otsu`], [`binarise_hysteresis`]: grey values to a [`Mask`];
 //! - [`keep_largest`], [`remove_smaller_than`], [`Components`]: what belongs together;
 //! - [`zhang_suen`] (as scikit-image's `skeletonize`), [`guo_hall`]: lines one pixel wide;
+//! - [`Polarity`]: whether the body is dark, as everything here takes it to be, or bright;
 //! - [`Segmenter`]: whatever finds the body in an image, with a [`Segmentation`] as its answer;
 //! - [`Skeleton`]: its endpoints, junctions and gaps, and its pixels for the stages that follow;
 //! - [`gap_hints()`]: where a probability map goes on between two pieces of its mask;
@@ -37,6 +38,7 @@ mod mask;
 mod median;
 #[cfg(feature = "network")]
 pub mod network;
+mod polarity;
 mod post_processing;
 mod ridge;
 mod segmentation;
@@ -54,6 +56,7 @@ pub use distance::{distance_to_background, median_width_px};
 pub use error::SegError;
 pub use gap_hints::{GapHint, GapParams, gap_hints};
 pub use mask::Mask;
+pub use polarity::Polarity;
 pub use post_processing::PostProcessing;
 pub use ridge::{RidgeParams, RidgePoint, median_ridge_width_px, ridge_centreline};
 pub use segmentation::{Progress, Segmentation, Segmenter, Watch, unwatched};

@@ -10,9 +10,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use accurate_seg::network::{
     Engine, Manifest, Mirroring, ModelBundle, ModelError, NetworkOptions, NetworkSegmenter,
-    OrtEngine, OrtRuntime, Polarity, RtenEngine,
+    OrtEngine, OrtRuntime, RtenEngine,
 };
-use accurate_seg::{Mask, PostProcessing, SegError, Segmenter, unwatched};
+use accurate_seg::{Mask, Polarity, PostProcessing, SegError, Segmenter, unwatched};
 use ndarray::Array2;
 use rayon::prelude::*;
 
@@ -246,9 +246,9 @@ fn the_strand_is_found_dark_or_bright_at_either_depth() {
     let bundle = bundle(DARK, |_| {});
     let image = picture(120, 200);
     let truth = PostProcessing::PAPER;
-    let of = |image: &Array2<f32>, polarity| {
-        let options = NetworkOptions { polarity, ..NetworkOptions::DEFAULT };
-        segmenter(&bundle, 1, options).segment(image, &unwatched).unwrap()
+    let segmenter = segmenter(&bundle, 1, NetworkOptions::DEFAULT);
+    let of = |image: &Array2<f32>, polarity: Polarity| {
+        segmenter.segment(&polarity.with_body_dark(image.clone()), &unwatched).unwrap()
     };
     let found = of(&image, Polarity::BodyDark);
     assert!(found.mask.count() > 400 && truth.mask_of(&found.probability).is_ok());

@@ -2,7 +2,7 @@ use accurate_eval::curve_scores;
 use accurate_seg::{SegError, Segmenter, Watch};
 use serde::Serialize;
 
-use crate::robust::{RIVAL_PX, Suspicion, px_per_unit};
+use crate::robust::{SAME_PX, Suspicion, calls_for_a_careful_look, px_per_unit};
 use crate::{
     Error, InputKind, Method, Params, Reconstruction, ViewPair, reconstruct, segment_images,
 };
@@ -20,11 +20,11 @@ pub struct CarefulLook {
 /// The curve of a pair of images and, where that is another one, the pair that it rests on.
 ///
 /// `pair` holds what [`segment_images`](crate::segment_images) made of its images, and is reconstructed
-/// as by [`reconstruct`]. Where there is reason to doubt that [`Method::Accurate`] found the right curve,
+/// as by [`reconstruct`]. Where it is not beyond doubt that [`Method::Accurate`] found the right curve,
 /// or where it found none, the images are segmented once more with more care
 /// ([`Segmenter::careful`]): another segmentation breaks the body elsewhere. Of the two curves
-/// that one stays which leaves less unexplained and bends less; if they are not the same, that is a
-/// reason for doubt ([`Suspicion::Ambiguous`]).
+/// that one stays which leaves less unexplained and bends less. Whether they are the same decides
+/// whether the order of the strands is ambiguous ([`Suspicion::Ambiguous`]).
 ///
 /// # Errors
 /// As [`reconstruct`]; [`Error::Segmentation`] if `watch` ends the second segmentation.
@@ -61,7 +61,6 @@ pub fn reconstruct_images(
     Ok((curve, taken.then_some(again)))
 }
 
-/// Noise and depth that is weakly seen stay with any segmentation.
 fn is_worth_a_look(first: &Result<Reconstruction, Error>, params: &Params) -> bool {
     if params.method != Method::Accurate || params.input != InputKind::Image {
         return false;
@@ -69,9 +68,8 @@ fn is_worth_a_look(first: &Result<Reconstruction, Error>, params: &Params) -> bo
     match first {
         Ok(curve) => curve
             .diagnostics
-            .suspicions
-            .iter()
-            .any(|reason| !matches!(reason, Suspicion::Misfit | Suspicion::Uncertain)),
+            .outline
+            .is_some_and(|outline| calls_for_a_careful_look(&outline.evidence)),
         Err(Error::NotSegmented { .. } | Error::MissingInput { .. }) => false,
         Err(_) => true,
     }
@@ -88,9 +86,12 @@ fn apart_px(a: &Reconstruction, b: &Reconstruction, pair: &ViewPair) -> Option<f
     Some(curve_scores(&a, &b, 1.0 / per_unit).ok()?.hausdorff * per_unit)
 }
 
+/// The order of the strands is ambiguous if two segmentations give different curves, and is not if they
+/// agree, however close a rival: where a map misleads is chance.
 fn doubt(curve: &mut Reconstruction, apart_px: Option<f64>) {
     let reasons = &mut curve.diagnostics.suspicions;
-    if apart_px.is_none_or(|px| px > RIVAL_PX) && !reasons.contains(&Suspicion::Ambiguous) {
+    reasons.retain(|reason| *reason != Suspicion::Ambiguous);
+    if apart_px.is_none_or(|px| px > SAME_PX) {
         reasons.push(Suspicion::Ambiguous);
         reasons.sort_unstable();
     }
@@ -185,7 +186,7 @@ mod tests {
         let segmenter = Off::new(FAR_ROWS, Some(Off::new(0, None)));
         let (curve, seen) = looked(&pair, &segmenter).unwrap();
         let look = curve.diagnostics.careful_look.unwrap();
-        assert!(look.taken && look.apart_px.unwrap() > RIVAL_PX, "{look:?}");
+        assert!(look.taken && look.apart_px.unwrap() > SAME_PX, "{look:?}");
         assert!(curve.diagnostics.suspicions.contains(&Suspicion::Ambiguous));
         assert_eq!(seen.unwrap().masks, Some(case.masks));
 
@@ -225,5 +226,20 @@ mod tests {
         let paper = Params::new(InputKind::Image, Method::Paper);
         let (curve, _) = reconstruct_images(&pair, &paper, &segmenter, &ended).unwrap();
         assert_eq!(curve.diagnostics.careful_look, None);
+    }
+
+    #[test]
+    fn two_segmentations_that_agree_settle_an_ambiguous_order_and_others_raise_it() {
+        let (_, pair) = case();
+        let (mut curve, _) = looked(&pair, &Off::new(0, None)).unwrap();
+        let doubts = |curve: &Reconstruction| curve.diagnostics.suspicions.clone();
+        assert_eq!(doubts(&curve), []);
+        for apart_px in [Some(2.0 * SAME_PX), None] {
+            doubt(&mut curve, apart_px);
+            assert_eq!(doubts(&curve), [Suspicion::Ambiguous]);
+        }
+        curve.diagnostics.suspicions.push(Suspicion::Uncertain);
+        doubt(&mut curve, Some(0.5 * SAME_PX));
+        assert_eq!(doubts(&curve), [Suspicion::Uncertain]);
     }
 }

@@ -19,7 +19,7 @@ pub struct ViewPair {
     /// Binary masks of both views.
     pub masks: Option<[Array2<bool>; 2]>,
     /// Grey images of both views, raw values. The body is taken to be darker than what surrounds it:
-    /// invert others first.
+    /// of others take [`Polarity::with_body_dark`](accurate_seg::Polarity::with_body_dark) first.
     pub images: Option<[Array2<f32>; 2]>,
     /// Probability of the body in both images, 0 to 1, where they were segmented
     /// ([`segment_images`](crate::segment_images)); the masks are then what was made of it.

@@ -2,6 +2,7 @@
 
 mod camera;
 mod figure;
+mod grey;
 mod reconstruct;
 mod segment;
 mod synth;
@@ -15,10 +16,9 @@ pub use self::camera::{
     CameraArgs, CameraCommand, CameraTarget, ConvertArgs, DoctorArgs, PlanArgs, ViewArgs,
 };
 pub use self::figure::{DemoArgs, FigureArgs};
+pub use self::grey::GreyArgs;
 pub use self::reconstruct::{Extra, ReconstructArgs, TraceArgs};
-pub use self::segment::{
-    EngineChoice, ImportArgs, Mirror, ModelArgs, ModelCommand, Photometric, SegmentArgs,
-};
+pub use self::segment::{EngineChoice, ImportArgs, Mirror, ModelArgs, ModelCommand, SegmentArgs};
 pub use self::synth::{
     CasesArgs, Disturbances, PointsKind, SynthArgs, SynthCommand, XrayArgs, XrayGenerator,
 };

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use accurate3d::{Closure, InputKind, Method};
 use clap::{Args, ValueEnum};
 
-use super::{ModelArgs, ViewArgs};
+use super::{GreyArgs, ModelArgs, ViewArgs};
 
 #[derive(Debug, Args)]
 pub struct ReconstructArgs {
@@ -51,6 +51,8 @@ pub struct ReconstructArgs {
     /// Exit with code 4 if a result is suspect; it is written all the same.
     #[arg(long)]
     pub strict: bool,
+    #[command(flatten)]
+    pub grey: GreyArgs,
     #[command(flatten)]
     pub model: ModelArgs,
 }

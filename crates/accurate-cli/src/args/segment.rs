@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
+use super::GreyArgs;
+
 /// Which network segments, and what runs it.
 #[derive(Debug, Args)]
 pub struct ModelArgs {
@@ -41,15 +43,6 @@ pub enum EngineChoice {
     Ort,
 }
 
-/// Meaning of an image's values.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Photometric {
-    /// The body is darker than its surroundings.
-    Monochrome2,
-    /// The stored values are inverted: the body is brighter.
-    Monochrome1,
-}
-
 #[derive(Debug, Args)]
 pub struct SegmentArgs {
     /// Grey images of 8 or 16 bits: PNG, JPEG, TIFF, PNM, BMP.
@@ -63,9 +56,8 @@ pub struct SegmentArgs {
     /// pixels down to 0.6 of it are taken where they hang together with such a one.
     #[arg(long, value_name = "P")]
     pub threshold: Option<f32>,
-    /// Whether the body is dark or bright in the stored values.
-    #[arg(long, value_enum, default_value_t = Photometric::Monochrome2)]
-    pub photometric: Photometric,
+    #[command(flatten)]
+    pub grey: GreyArgs,
     #[command(flatten)]
     pub model: ModelArgs,
 }

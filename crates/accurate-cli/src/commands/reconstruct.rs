@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use accurate3d::fit::CalibrationPriors;
 use accurate3d::io::{PairParts, Truth, find_pairs, hash_file, hash_pair, read_pair};
 use accurate3d::seg::network::NetworkSegmenter;
-use accurate3d::seg::{Segmenter, unwatched};
+use accurate3d::seg::{Polarity, Segmenter, unwatched};
 use accurate3d::{
     Closure, InputKind, Method, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair,
     reconstruct, reconstruct_images, segment_images,
@@ -89,16 +89,30 @@ pub fn run(args: &ReconstructArgs, config: &str, console: &Console) -> Result<()
 
 /// Options that the method would pass over without a word.
 fn refuse_what_takes_no_effect(args: &ReconstructArgs) -> Result<(), Failure> {
-    let options = [
+    let of_accurate = [
         (args.refine_calibration, "--refine-calibration"),
         (args.closed == Closure::Closed, "--closed yes"),
     ];
-    match options.into_iter().find(|(given, _)| *given) {
-        Some((_, option)) if args.method != Method::Accurate => {
-            let message = format!("the method `{}` knows no {option}", args.method);
-            Err(Failure::new(Failure::USAGE, message)
-                .with_hint("take --method accurate, or leave the option out"))
-        }
+    let of_images = [
+        (args.grey.polarity() == Polarity::BodyBright, "--photometric monochrome1"),
+        (args.model.model.is_some(), "--model"),
+        (args.model.onnxruntime.is_some(), "--onnxruntime"),
+    ];
+    let refused = |message: String, hint: String| {
+        Err(Failure::new(Failure::USAGE, message).with_hint(hint + ", or leave the option out"))
+    };
+    let given = |options: &[(bool, &'static str)]| {
+        options.iter().find(|(given, _)| *given).map(|(_, option)| *option)
+    };
+    match (given(&of_accurate), given(&of_images)) {
+        (Some(option), _) if args.method != Method::Accurate => refused(
+            format!("the method `{}` knows no {option}", args.method),
+            "take --method accurate".into(),
+        ),
+        (_, Some(option)) if args.input != InputKind::Image => refused(
+            format!("--input {} reads no images, which {option} is for", args.input),
+            "take --input image".into(),
+        ),
         _ => Ok(()),
     }
 }
@@ -235,7 +249,9 @@ fn one(
     args: &ReconstructArgs,
     segmenter: Option<&NetworkSegmenter>,
 ) -> Result<Done, Failure> {
-    let Read { pair, shown, inputs } = read(source, args, out.has_report())?;
+    let Read { mut pair, shown, inputs } = read(source, args, out.has_report())?;
+    let polarity = args.grey.polarity();
+    pair.images = pair.images.map(|both| both.map(|image| polarity.with_body_dark(image)));
     check_points(&pair)?;
     let pair = match segmenter {
         Some(segmenter) => segment_images(pair, segmenter, &unwatched)?,
@@ -252,6 +268,7 @@ fn one(
     let mut result = result_json(&shown, inputs, &pair, &params, &reconstruction)?;
     if let Some(segmenter) = segmenter {
         result["parameters"]["segmentation"] = Value::from(segmenter.describe());
+        result["parameters"]["polarity"] = Value::from(format!("{polarity:?}"));
     }
     out.write(&pair, &reconstruction, &result)?;
     let doubted = !reconstruction.diagnostics.suspicions.is_empty();

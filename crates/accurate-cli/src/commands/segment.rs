@@ -3,15 +3,15 @@ use std::path::{Path, PathBuf};
 
 use accurate3d::NOT_FOR_CLINICAL_USE;
 use accurate3d::io::{read_grey, write_mask, write_rgb, write_u16};
-use accurate3d::seg::network::{NetworkOptions, NetworkSegmenter, Polarity};
+use accurate3d::seg::network::{NetworkOptions, NetworkSegmenter};
 use accurate3d::seg::{
-    Components, Mask, PostProcessing, RidgeParams, RidgePoint, Segmenter, median_ridge_width_px,
-    median_width_px, ridge_centreline, unwatched, zhang_suen,
+    Components, Mask, Polarity, PostProcessing, RidgeParams, RidgePoint, Segmenter,
+    median_ridge_width_px, median_width_px, ridge_centreline, unwatched, zhang_suen,
 };
 use ndarray::Array2;
 use serde_json::{Value, json};
 
-use crate::args::{Photometric, SegmentArgs};
+use crate::args::SegmentArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::segmentation::segmenter_with;
@@ -24,12 +24,8 @@ const WEAK: f32 = 0.6;
 /// the others.
 pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
     let jobs = jobs(args)?;
-    let polarity = match args.photometric {
-        Photometric::Monochrome2 => Polarity::BodyDark,
-        Photometric::Monochrome1 => Polarity::BodyBright,
-    };
+    let polarity = args.grey.polarity();
     let segmenter = segmenter_with(&args.model, console, |options, own| NetworkOptions {
-        polarity,
         postprocessing: args.threshold.map(|high| PostProcessing { low: WEAK * high, high, ..own }),
         ..options
     })?;
@@ -37,7 +33,7 @@ pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
     let bar = console.progress(jobs.len(), "segmenting");
     let (mut failed, mut first_failure) = (0, None);
     for (image, name) in &jobs {
-        match one(image, name, &args.out, &segmenter) {
+        match one(image, name, &args.out, polarity, &segmenter) {
             Ok(report) if console.json => console.json(&report)?,
             Ok(report) => console.data(&line(&report))?,
             Err(failure) => {
@@ -85,10 +81,11 @@ fn one(
     path: &Path,
     name: &str,
     out: &Path,
+    polarity: Polarity,
     segmenter: &NetworkSegmenter,
 ) -> Result<Value, Failure> {
     let image = read_grey(path)?.values;
-    let found = segmenter.segment(&image, &unwatched)?;
+    let found = segmenter.segment(&polarity.with_body_dark(image.clone()), &unwatched)?;
     let skeleton = zhang_suen(&found.mask);
     let file = |what: &str| out.join(format!("{name}_{what}.png"));
     write_mask(&file("mask"), found.mask.as_array())?;

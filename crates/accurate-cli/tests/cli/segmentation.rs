@@ -115,6 +115,45 @@ fn images_are_segmented_and_reconstructed() {
 }
 
 #[test]
+fn bright_bodies_give_the_curve_of_dark_ones() {
+    let dir = TempDir::new().unwrap();
+    let model = dark_model(dir.path());
+    let pair = pair_of_shadows("bend", dir.path());
+    let run = |pair: &Path, out: &Path, more: &[&str]| {
+        let mut command = accurate();
+        command.args(["reconstruct", "-i", "image"]).args(more).arg("--model").arg(&model);
+        command.arg("-o").arg(out).arg(pair).assert().success();
+        fs::read(out.join("curve.csv")).unwrap()
+    };
+    let dark = run(&pair, &dir.path().join("dark"), &[]);
+    for view in ["L", "R"] {
+        let file = pair.join(format!("images/view_{view}.png"));
+        let image = accurate3d::io::read_grey(&file).unwrap().values;
+        // The sum of the two grey values of a shadow.
+        accurate3d::io::write_u8(&file, &image.mapv(|grey| (230.0 - grey) as u8)).unwrap();
+    }
+    let out = dir.path().join("bright");
+    assert_eq!(run(&pair, &out, &["--photometric", "monochrome1"]), dark);
+    let result: Value =
+        serde_json::from_slice(&fs::read(out.join("result.json")).unwrap()).unwrap();
+    assert_eq!(result["parameters"]["polarity"], "BodyBright");
+}
+
+#[test]
+fn options_of_images_are_refused_where_none_are_read() {
+    let dir = TempDir::new().unwrap();
+    for option in [["--photometric", "monochrome1"], ["--model", "no.accmodel"]] {
+        let out = dir.path().join("out");
+        let mut command = accurate();
+        command.args(["reconstruct", "-i", "mask"]).args(option).arg("-o").arg(&out);
+        let (code, message) = failure(command.arg(samples().join("bend")));
+        assert_eq!(code, 2, "{message}");
+        assert!(message.contains(option[0]) && message.contains("--input image"), "{message}");
+        assert!(!out.exists());
+    }
+}
+
+#[test]
 fn segment_writes_mask_probability_and_overlay() {
     let dir = TempDir::new().unwrap();
     let model = dark_model(dir.path());

@@ -29,7 +29,6 @@ pub use engine::Engine;
 pub use manifest::{Manifest, NetworkSpec, Normalisation, Tiling};
 pub use model_error::ModelError;
 pub use nnunet::NnunetFolder;
-pub use normalise::Polarity;
 pub use onnx_check::NetworkFacts;
 #[cfg(feature = "ort")]
 pub use ort_engine::{OrtEngine, OrtRuntime};

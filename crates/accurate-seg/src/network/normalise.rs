@@ -4,16 +4,6 @@ use super::Normalisation;
 use crate::SegError;
 use crate::threshold::require_finite;
 
-/// Whether the body is darker or brighter than its surroundings in the grey values as stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Polarity {
-    /// Darker, as in DICOM's MONOCHROME2 and in ordinary image files.
-    #[default]
-    BodyDark,
-    /// Brighter, as the stored values of DICOM's MONOCHROME1.
-    BodyBright,
-}
-
 /// Grey values as the network wants them. In f64 until the last step: a 16-bit image has a
 /// mean far from 0.
 ///
@@ -23,7 +13,6 @@ pub enum Polarity {
 pub(super) fn normalise(
     image: &Array2<f32>,
     scheme: Normalisation,
-    polarity: Polarity,
 ) -> Result<Array2<f32>, SegError> {
     let (height, width) = image.dim();
     let Some(&first) = image.first() else {
@@ -35,21 +24,16 @@ pub(super) fn normalise(
     if least == greatest {
         return Err(SegError::Constant { value: first });
     }
-    // Exchanging bright and dark within the image's own range keeps every scheme meaningful.
-    let grey = |value: f32| match polarity {
-        Polarity::BodyDark => f64::from(value),
-        Polarity::BodyBright => f64::from(least) + f64::from(greatest) - f64::from(value),
-    };
-    let scaled = |shift: f64, scale: f64| image.mapv(|v| ((grey(v) - shift) / scale) as f32);
+    let scaled = |shift: f64, scale: f64| image.mapv(|v| ((f64::from(v) - shift) / scale) as f32);
     Ok(match scheme {
         Normalisation::ZScore { least_std } => {
             let n = image.len() as f64;
-            let mean = image.iter().map(|&v| grey(v)).sum::<f64>() / n;
-            let variance = image.iter().map(|&v| (grey(v) - mean).powi(2)).sum::<f64>() / n;
+            let mean = image.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
+            let variance = image.iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / n;
             scaled(mean, variance.sqrt().max(least_std))
         }
         Normalisation::Fixed { low, high, mean, std } => {
-            image.mapv(|v| ((grey(v).clamp(low, high) - mean) / std) as f32)
+            image.mapv(|v| ((f64::from(v).clamp(low, high) - mean) / std) as f32)
         }
         Normalisation::ZeroToOne => {
             let range = f64::from(greatest) - f64::from(least);
@@ -75,7 +59,7 @@ mod tests {
     #[test]
     fn depth_does_not_matter_to_a_z_score() {
         // A permutation of 0..=255: mean 127.5, variance (256^2 - 1) / 12.
-        let eight = normalise(&ramp(1.0, 0.0), Z, Polarity::BodyDark).unwrap();
+        let eight = normalise(&ramp(1.0, 0.0), Z).unwrap();
         let std = (65_535.0_f64 / 12.0).sqrt();
         for (got, grey) in eight.iter().zip(ramp(1.0, 0.0).iter()) {
             let expected = ((f64::from(*grey) - 127.5) / std) as f32;
@@ -83,20 +67,9 @@ mod tests {
             assert!((got - expected).abs() <= 2.0 * f32::EPSILON, "{got} {expected}");
         }
         // 257 maps 8 bits onto 16 exactly, so that only the last rounding may differ.
-        let sixteen = normalise(&ramp(257.0, 0.0), Z, Polarity::BodyDark).unwrap();
+        let sixteen = normalise(&ramp(257.0, 0.0), Z).unwrap();
         for (a, b) in eight.iter().zip(&sixteen) {
             assert!((a - b).abs() <= 2.0 * f32::EPSILON, "{a} {b}");
-        }
-    }
-
-    #[test]
-    fn the_other_polarity_of_an_inverted_image_is_the_image() {
-        let image = ramp(1.0, 0.0);
-        let inverted = image.mapv(|v| 255.0 - v);
-        for scheme in [Z, Normalisation::ZeroToOne, Normalisation::Over255] {
-            let a = normalise(&image, scheme, Polarity::BodyDark).unwrap();
-            let b = normalise(&inverted, scheme, Polarity::BodyBright).unwrap();
-            assert_eq!(a, b, "{scheme:?}");
         }
     }
 
@@ -104,29 +77,26 @@ mod tests {
     fn the_training_sets_own_figures_clip_and_scale() {
         let scheme = Normalisation::Fixed { low: 10.0, high: 20.0, mean: 15.0, std: 5.0 };
         let image = Array2::from_shape_vec((1, 4), vec![0.0, 10.0, 17.5, 99.0]).unwrap();
-        let got = normalise(&image, scheme, Polarity::BodyDark).unwrap();
+        let got = normalise(&image, scheme).unwrap();
         assert_eq!(got.into_raw_vec_and_offset().0, [-1.0, -1.0, 0.5, 1.0]);
     }
 
     #[test]
     fn blank_empty_and_broken_images_are_refused() {
         let blank = Array2::from_elem((3, 3), 7.0);
-        assert_eq!(
-            normalise(&blank, Z, Polarity::BodyDark),
-            Err(SegError::Constant { value: 7.0 })
-        );
+        assert_eq!(normalise(&blank, Z), Err(SegError::Constant { value: 7.0 }));
         let mut broken = ramp(1.0, 0.0);
         broken[[2, 3]] = f32::NAN;
-        let error = normalise(&broken, Z, Polarity::BodyDark).unwrap_err();
+        let error = normalise(&broken, Z).unwrap_err();
         assert!(matches!(error, SegError::NotFinite { row: 2, column: 3, .. }));
-        let empty = normalise(&Array2::zeros((0, 4)), Z, Polarity::BodyDark);
+        let empty = normalise(&Array2::zeros((0, 4)), Z);
         assert_eq!(empty, Err(SegError::EmptyImage { height: 0, width: 4 }));
     }
 
     #[test]
     fn the_extremes_of_f32_do_not_overflow() {
         let image = Array2::from_shape_vec((1, 3), vec![f32::MIN, 0.0, f32::MAX]).unwrap();
-        let got = normalise(&image, Z, Polarity::BodyDark).unwrap();
+        let got = normalise(&image, Z).unwrap();
         assert!(got.iter().all(|v| v.is_finite()));
     }
 }

@@ -4,14 +4,12 @@ use ndarray::{Array2, Axis};
 
 use super::normalise::normalise;
 use super::windows::{extend_to, starts, window_weights};
-use super::{Engine, Manifest, ModelBundle, Polarity};
+use super::{Engine, Manifest, ModelBundle};
 use crate::{Mask, PostProcessing, Progress, SegError, Segmentation, Segmenter, Watch};
 
 /// What a caller may choose about a segmentation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NetworkOptions {
-    /// Whether the body is the darker or the brighter.
-    pub polarity: Polarity,
     /// Over which mirror images probabilities are averaged.
     pub mirroring: Mirroring,
     /// From probabilities to a mask; `None` takes the model's own.
@@ -19,9 +17,8 @@ pub struct NetworkOptions {
 }
 
 impl NetworkOptions {
-    /// The body dark, looked at from both sides, the model's own post-processing.
-    pub const DEFAULT: Self =
-        Self { polarity: Polarity::BodyDark, mirroring: Mirroring::Opposite, postprocessing: None };
+    /// Looked at from both sides, the model's own post-processing.
+    pub const DEFAULT: Self = Self { mirroring: Mirroring::Opposite, postprocessing: None };
 }
 
 impl Default for NetworkOptions {
@@ -103,7 +100,7 @@ impl NetworkSegmenter {
         if (height as u64).saturating_mul(width as u64) > MAX_IMAGE_PX {
             return Err(SegError::TooLarge { height, width });
         }
-        let image = normalise(image, self.manifest.normalisation, self.options.polarity)?;
+        let image = normalise(image, self.manifest.normalisation)?;
         let multiple = self.manifest.network.multiple_px as usize;
         let padded = [height, width].map(|side| side.next_multiple_of(multiple));
         let tiling = self.manifest.tiling;

@@ -8,7 +8,7 @@ use super::evidence::Evidence;
 use super::frame::Turn;
 use super::grey_levels::{choose_by_grey_levels, on_grey_levels};
 use super::look::{Look, Seen};
-use super::suspicion::{Limits, Suspicion, suspicions};
+use super::suspicion::{Limits, Suspicion, calls_for_the_pictures, suspicions};
 use crate::{Closure, Error, Explanation, IntensityDiagnostics};
 
 /// How hard the joint choice looks.
@@ -180,8 +180,9 @@ pub(crate) fn reconstruct_masks(
         }
     }
     let Some(images) = images else { return Ok(seen.into_result(limits)) };
-    let overruled_by =
-        if in_doubt(&seen) { choose_by_grey_levels(&mut seen, images, rig, params) } else { None };
+    let overruled_by = calls_for_the_pictures(&seen.evidence())
+        .then(|| choose_by_grey_levels(&mut seen, images, rig, params))
+        .flatten();
     let mut result = seen.into_result(limits);
     result.grey_levels = Some(on_grey_levels(&mut result, images, rig, params, overruled_by));
     Ok(result)

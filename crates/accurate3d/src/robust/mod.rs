@@ -20,10 +20,11 @@ mod start;
 mod strays;
 mod suspicion;
 
-pub(crate) use choice::RIVAL_PX;
 pub use evidence::Evidence;
 pub(crate) use joint::{JointResult, reconstruct_masks};
 pub use joint::{RobustParams, SecondLook};
+pub(crate) use search::SAME_PX;
 pub(crate) use shape::px_per_unit;
 pub(crate) use strays::without_strays;
 pub use suspicion::Suspicion;
+pub(crate) use suspicion::calls_for_a_careful_look;

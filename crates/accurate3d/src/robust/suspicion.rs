@@ -53,13 +53,23 @@ impl Limits {
     };
 
     /// Of a network's probability maps, which add short pieces to right curves, and whose points lie
-    /// nearer to a right one than whole pixels: chosen on 389 generated pairs of images of tuning
-    /// seeds (`medium`, `easy`, `carm`, `sim-paper`; 110 of them wrong by more than 5 px).
+    /// nearer to a right one than whole pixels: chosen on 340 generated pairs of images of tuning
+    /// seeds (`medium`, `carm`, `easy`; 31 of them wrong by more than 5 px).
     pub(crate) const MAPS: Self = Self {
         unexplained: 1.0,
         unexplained_at_bridges: 1.0,
-        chi_per_point_px2: 0.055,
+        chi_per_point_px2: 0.058,
         margin: 2.0,
+        sigma_px: 1.9,
+    };
+
+    /// Of the same maps, beyond which more is asked of the images before the choice is final: narrower,
+    /// for asking costs time and no trust.
+    const MAPS_TO_ASK_ON: Self = Self {
+        unexplained: 0.5,
+        unexplained_at_bridges: 0.5,
+        chi_per_point_px2: 0.055,
+        margin: 5.0,
         sigma_px: 1.0,
     };
 }
@@ -98,6 +108,25 @@ pub(crate) fn suspicions(evidence: &Evidence, limits: &Limits) -> Vec<Suspicion>
 /// map leaves unexplained may be explained better.
 pub(crate) fn calls_for_a_second_look(evidence: &Evidence) -> bool {
     has_rival(evidence, MARGIN_TO_LOOK_AGAIN) || !suspicions(evidence, &Limits::MASKS).is_empty()
+}
+
+/// Walks this much dearer than the cheapest of each view are worth asking on, though the curves of most are
+/// right.
+const BEHIND_TO_ASK_ON: f64 = 2.0;
+
+/// Whether the choice among the curves of maps is worth asking the pictures' grey levels about.
+pub(crate) fn calls_for_the_pictures(evidence: &Evidence) -> bool {
+    evidence.walks_behind > BEHIND_TO_ASK_ON
+        || !suspicions(evidence, &Limits::MAPS_TO_ASK_ON).is_empty()
+}
+
+/// Whether the images are worth segmenting again with more care: noise and depth that is weakly seen
+/// stay with any segmentation.
+pub(crate) fn calls_for_a_careful_look(evidence: &Evidence) -> bool {
+    evidence.walks_behind > BEHIND_TO_ASK_ON
+        || suspicions(evidence, &Limits::MAPS_TO_ASK_ON)
+            .iter()
+            .any(|reason| !matches!(reason, Suspicion::Misfit | Suspicion::Uncertain))
 }
 
 fn has_rival(evidence: &Evidence, closer_than: f64) -> bool {
@@ -191,5 +220,26 @@ mod tests {
         let far = Evidence { chi_per_point: 0.06, ..GOOD };
         assert_eq!(of_maps(&far), [Suspicion::Misfit]);
         assert!(of_masks(&far).is_empty());
+    }
+
+    #[test]
+    fn images_are_asked_on_before_there_is_a_reason_for_doubt() {
+        let maps = Evidence { chi_per_point: 0.04, ..GOOD };
+        assert!(!calls_for_the_pictures(&maps) && !calls_for_a_careful_look(&maps));
+        for evidence in [
+            Evidence { unexplained: 0.7, ..maps },
+            Evidence { margin: Some(4.0), ..maps },
+            Evidence { walks_behind: 3.0, ..maps },
+        ] {
+            assert!(suspicions(&evidence, &Limits::MAPS).is_empty());
+            assert!(calls_for_the_pictures(&evidence) && calls_for_a_careful_look(&evidence));
+        }
+        // Noise and depth stay as they are in another segmentation.
+        for evidence in
+            [Evidence { sigma_px: 1.5, ..maps }, Evidence { chi_per_point: 0.057, ..maps }]
+        {
+            assert!(suspicions(&evidence, &Limits::MAPS).is_empty());
+            assert!(calls_for_the_pictures(&evidence) && !calls_for_a_careful_look(&evidence));
+        }
     }
 }
