@@ -47,6 +47,7 @@ pub(super) fn normalise(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Polarity;
 
     const Z: Normalisation = Normalisation::ZScore { least_std: 1e-6 };
 
@@ -70,6 +71,17 @@ mod tests {
         let sixteen = normalise(&ramp(257.0, 0.0), Z).unwrap();
         for (a, b) in eight.iter().zip(&sixteen) {
             assert!((a - b).abs() <= 2.0 * f32::EPSILON, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn the_other_polarity_of_an_inverted_image_is_the_image() {
+        let image = ramp(1.0, 0.0);
+        let inverted = Polarity::BodyBright.with_body_dark(image.mapv(|v| 255.0 - v));
+        for scheme in [Z, Normalisation::ZeroToOne, Normalisation::Over255] {
+            let a = normalise(&image, scheme).unwrap();
+            let b = normalise(&inverted, scheme).unwrap();
+            assert_eq!(a, b, "{scheme:?}");
         }
     }
 

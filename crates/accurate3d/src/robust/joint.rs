@@ -164,8 +164,8 @@ pub(crate) fn reconstruct_masks(
 ) -> Result<JointResult, Error> {
     let look = |turn| Look { masks, probabilities, rig, params, closure, turn, case }.look();
     let limits = if probabilities.is_some() { &Limits::MAPS } else { &Limits::MASKS };
-    let in_doubt = |seen: &Seen| !suspicions(&seen.evidence(), limits).is_empty();
-    let worth_it = |seen: &Seen| !seen.is_hopeless() && in_doubt(seen);
+    let worth_it =
+        |seen: &Seen| !seen.is_hopeless() && !suspicions(&seen.evidence(), limits).is_empty();
     let mut seen = look(Turn::NONE)?;
     for turn in Turn::OTHERS {
         // Every pair of closed walks has been fitted from everywhere.
@@ -180,9 +180,11 @@ pub(crate) fn reconstruct_masks(
         }
     }
     let Some(images) = images else { return Ok(seen.into_result(limits)) };
-    let overruled_by = calls_for_the_pictures(&seen.evidence())
-        .then(|| choose_by_grey_levels(&mut seen, images, rig, params))
-        .flatten();
+    let overruled_by = if calls_for_the_pictures(&seen.evidence()) {
+        choose_by_grey_levels(&mut seen, images, rig, params)
+    } else {
+        None
+    };
     let mut result = seen.into_result(limits);
     result.grey_levels = Some(on_grey_levels(&mut result, images, rig, params, overruled_by));
     Ok(result)

@@ -116,17 +116,20 @@ const BEHIND_TO_ASK_ON: f64 = 2.0;
 
 /// Whether the choice among the curves of maps is worth asking the pictures' grey levels about.
 pub(crate) fn calls_for_the_pictures(evidence: &Evidence) -> bool {
-    evidence.walks_behind > BEHIND_TO_ASK_ON
-        || !suspicions(evidence, &Limits::MAPS_TO_ASK_ON).is_empty()
+    is_worth_asking_on(evidence, |_| true)
 }
 
 /// Whether the images are worth segmenting again with more care: noise and depth that is weakly seen
 /// stay with any segmentation.
 pub(crate) fn calls_for_a_careful_look(evidence: &Evidence) -> bool {
+    is_worth_asking_on(evidence, |reason| {
+        !matches!(reason, Suspicion::Misfit | Suspicion::Uncertain)
+    })
+}
+
+fn is_worth_asking_on(evidence: &Evidence, counts: fn(&Suspicion) -> bool) -> bool {
     evidence.walks_behind > BEHIND_TO_ASK_ON
-        || suspicions(evidence, &Limits::MAPS_TO_ASK_ON)
-            .iter()
-            .any(|reason| !matches!(reason, Suspicion::Misfit | Suspicion::Uncertain))
+        || suspicions(evidence, &Limits::MAPS_TO_ASK_ON).iter().any(counts)
 }
 
 fn has_rival(evidence: &Evidence, closer_than: f64) -> bool {

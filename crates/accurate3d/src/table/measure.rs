@@ -193,7 +193,7 @@ const NOT_SEGMENTED: &str = "ask for --input image";
 /// Measures every row on every case; the same numbers for any number of threads.
 ///
 /// The images of generated cases are X-ray pictures with the default options; each is segmented
-/// once for all rows, and once more where `accurate` mode doubts its curve. `on_case` is called when
+/// once for all rows, and once more where `accurate` mode is not sure of its curve. `on_case` is called when
 /// a case is done.
 ///
 /// # Errors
