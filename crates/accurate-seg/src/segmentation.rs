@@ -29,10 +29,19 @@ pub trait Segmenter: fmt::Debug + Send + Sync {
     /// implementation itself refuses.
     fn segment(&self, image: &Array2<f32>, watch: &Watch<'_>) -> Result<Segmentation, SegError>;
 
-    /// The same with more care, at several times the cost: what is asked where a result is in doubt.
-    /// `None` where there is no such way, or where it is the one that is always gone.
-    fn careful(&self) -> Option<Box<dyn Segmenter + '_>> {
-        None
+    /// The same image once more, with more care: what is asked where a result is in doubt. `before` is the
+    /// probability that [`segment`](Self::segment) gave for it, of the image's shape, on which this may
+    /// build. `None` where there is no more careful way, or where it is the one that is always gone.
+    ///
+    /// # Errors
+    /// Those of [`segment`](Self::segment), and [`SegError::WrongShape`] if `before` has another shape.
+    fn segment_again(
+        &self,
+        _image: &Array2<f32>,
+        _before: &Array2<f32>,
+        _watch: &Watch<'_>,
+    ) -> Result<Option<Segmentation>, SegError> {
+        Ok(None)
     }
 
     /// What segments, for a report: model, engine and settings in one line.

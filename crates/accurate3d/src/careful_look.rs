@@ -3,9 +3,8 @@ use accurate_seg::{SegError, Segmenter, Watch};
 use serde::Serialize;
 
 use crate::robust::{SAME_PX, Suspicion, calls_for_a_careful_look, px_per_unit};
-use crate::{
-    Error, InputKind, Method, Params, Reconstruction, ViewPair, reconstruct, segment_images,
-};
+use crate::segment::segment_images_again;
+use crate::{Error, InputKind, Method, Params, Reconstruction, ViewPair, reconstruct};
 
 /// What came of a second, careful segmentation of both images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -22,7 +21,7 @@ pub struct CarefulLook {
 /// `pair` holds what [`segment_images`](crate::segment_images) made of its images, and is reconstructed
 /// as by [`reconstruct`]. Where it is not beyond doubt that [`Method::Accurate`] found the right curve,
 /// or where it found none, the images are segmented once more with more care
-/// ([`Segmenter::careful`]): another segmentation breaks the body elsewhere. Of the two curves
+/// ([`Segmenter::segment_again`]): another segmentation breaks the body elsewhere. Of the two curves
 /// that one stays which leaves less unexplained and bends less. Whether they are the same decides
 /// whether the order of the strands is ambiguous ([`Suspicion::Ambiguous`]).
 ///
@@ -35,15 +34,16 @@ pub fn reconstruct_images(
     watch: &Watch<'_>,
 ) -> Result<(Reconstruction, Option<ViewPair>), Error> {
     let first = reconstruct(pair, params);
-    let careful = segmenter.careful().filter(|_| is_worth_a_look(&first, params));
-    let Some(careful) = careful else { return first.map(|curve| (curve, None)) };
-    let again = match segment_images(pair.clone(), &*careful, watch) {
-        Ok(again) => again,
+    if !is_worth_a_look(&first, params) {
+        return first.map(|curve| (curve, None));
+    }
+    let again = match segment_images_again(pair, segmenter, watch) {
+        Ok(Some(again)) => again,
         Err(error @ Error::Segmentation { source: SegError::Cancelled { .. }, .. }) => {
             return Err(error);
         }
-        // Nothing found: the first look is all there is.
-        Err(_) => return first.map(|curve| (curve, None)),
+        // No other way, or nothing found: the first look is all there is.
+        Ok(None) | Err(_) => return first.map(|curve| (curve, None)),
     };
     let (mut curve, taken, apart_px) = match (first, reconstruct(&again, params)) {
         (Ok(first), Ok(second)) => {
@@ -107,6 +107,7 @@ mod tests {
 
     use super::*;
     use crate::segment::tests::case;
+    use crate::segment_images;
 
     /// Reads the body off an image that shows nothing else, but in view 1, which it is asked for first, some
     /// rows too high.
@@ -142,30 +143,17 @@ mod tests {
             Ok(Segmentation { probability, mask })
         }
 
-        fn careful(&self) -> Option<Box<dyn Segmenter + '_>> {
-            let careful = self.careful.as_ref()?;
-            Some(Box::new(Borrowed(careful)))
+        fn segment_again(
+            &self,
+            image: &Array2<f32>,
+            _before: &Array2<f32>,
+            watch: &Watch<'_>,
+        ) -> Result<Option<Segmentation>, SegError> {
+            self.careful.as_ref().map(|careful| careful.segment(image, watch)).transpose()
         }
 
         fn describe(&self) -> String {
             format!("dark pixels, {} rows too high", self.rows)
-        }
-    }
-
-    #[derive(Debug)]
-    struct Borrowed<'a>(&'a Off);
-
-    impl Segmenter for Borrowed<'_> {
-        fn segment(
-            &self,
-            image: &Array2<f32>,
-            watch: &Watch<'_>,
-        ) -> Result<Segmentation, SegError> {
-            self.0.segment(image, watch)
-        }
-
-        fn describe(&self) -> String {
-            self.0.describe()
         }
     }
 

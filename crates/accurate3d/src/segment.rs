@@ -13,24 +13,61 @@ use crate::{Error, InputKind, ViewPair};
 /// [`Error::MissingInput`] without images; [`Error::Segmentation`] naming the view, also where
 /// nothing of the body was found in it.
 pub fn segment_images(
-    mut pair: ViewPair,
+    pair: ViewPair,
     segmenter: &dyn Segmenter,
     watch: &Watch<'_>,
 ) -> Result<ViewPair, Error> {
-    let [image1, image2] = pair
-        .images
-        .as_ref()
-        .ok_or_else(|| Error::MissingInput { case: pair.id.clone(), input: InputKind::Image })?;
-    let one = |image: &Array2<f32>, view: u8| -> Result<Segmentation, Error> {
-        let refuse = |source| Error::Segmentation { case: pair.id.clone(), view, source };
-        let found = segmenter.segment(image, watch).map_err(refuse)?;
-        same_shape(image, &found).and_then(|()| found.mask.require_foreground()).map_err(refuse)?;
-        Ok(found)
+    let [image1, image2] = images(&pair)?;
+    let one = |image: &Array2<f32>, view| {
+        let found = segmenter.segment(image, watch);
+        found.and_then(|found| checked(found, image)).map_err(|source| refused(&pair, view, source))
     };
-    let (view1, view2) = (one(image1, 1)?, one(image2, 2)?);
+    let both = [one(image1, 1)?, one(image2, 2)?];
+    Ok(seen(pair, both))
+}
+
+/// The pair as [`segment_images`] made it, with probabilities and masks of a more careful segmentation
+/// ([`Segmenter::segment_again`]); none where there is no such way.
+///
+/// # Errors
+/// As [`segment_images`].
+pub(crate) fn segment_images_again(
+    pair: &ViewPair,
+    segmenter: &dyn Segmenter,
+    watch: &Watch<'_>,
+) -> Result<Option<ViewPair>, Error> {
+    let images = images(pair)?;
+    let Some(before) = &pair.probabilities else { return Ok(None) };
+    let again = |image: &Array2<f32>, before: &Array2<f32>, view| {
+        let found = segmenter.segment_again(image, before, watch);
+        found
+            .and_then(|found| found.map(|found| checked(found, image)).transpose())
+            .map_err(|source| refused(pair, view, source))
+    };
+    let Some(view1) = again(&images[0], &before[0], 1)? else { return Ok(None) };
+    let Some(view2) = again(&images[1], &before[1], 2)? else { return Ok(None) };
+    Ok(Some(seen(pair.clone(), [view1, view2])))
+}
+
+fn images(pair: &ViewPair) -> Result<&[Array2<f32>; 2], Error> {
+    let missing = || Error::MissingInput { case: pair.id.clone(), input: InputKind::Image };
+    pair.images.as_ref().ok_or_else(missing)
+}
+
+fn checked(found: Segmentation, image: &Array2<f32>) -> Result<Segmentation, SegError> {
+    same_shape(image, &found)?;
+    found.mask.require_foreground()?;
+    Ok(found)
+}
+
+fn refused(pair: &ViewPair, view: u8, source: SegError) -> Error {
+    Error::Segmentation { case: pair.id.clone(), view, source }
+}
+
+fn seen(mut pair: ViewPair, [view1, view2]: [Segmentation; 2]) -> ViewPair {
     pair.masks = Some([view1.mask.into_array(), view2.mask.into_array()]);
     pair.probabilities = Some([view1.probability, view2.probability]);
-    Ok(pair)
+    pair
 }
 
 /// A segmenter of the caller's own may be wrong about its shapes; the stages after it rely on them.

@@ -86,14 +86,14 @@ impl NetworkSegmenter {
         image: &Array2<f32>,
         watch: &Watch<'_>,
     ) -> Result<Array2<f32>, SegError> {
-        self.seen(image, self.options.mirroring, watch)
+        self.seen(image, &self.mirrors(self.options.mirroring), watch)
     }
 
     /// The probability, averaged over mirror images.
     fn seen(
         &self,
         image: &Array2<f32>,
-        mirroring: Mirroring,
+        mirrors: &[[bool; 2]],
         watch: &Watch<'_>,
     ) -> Result<Array2<f32>, SegError> {
         let (height, width) = image.dim();
@@ -111,8 +111,7 @@ impl NetworkSegmenter {
         };
         let sides = [padded[0].max(window[0]), padded[1].max(window[1])];
         let padded = extend_to(&image, sides);
-        let mirrors = self.mirrors(mirroring);
-        let probability = self.in_windows(&padded.image, window, &mirrors, watch)?;
+        let probability = self.in_windows(&padded.image, window, mirrors, watch)?;
         let [top, left] = padded.before;
         Ok(Array2::from_shape_fn((height, width), |(row, col)| {
             probability[[top + row, left + col]]
@@ -177,27 +176,10 @@ impl NetworkSegmenter {
         mirrors
     }
 
-    fn segmentation(
-        &self,
-        image: &Array2<f32>,
-        mirroring: Mirroring,
-        watch: &Watch<'_>,
-    ) -> Result<Segmentation, SegError> {
-        let probability = self.seen(image, mirroring, watch)?;
+    fn with_mask(&self, probability: Array2<f32>) -> Result<Segmentation, SegError> {
         let post = self.options.postprocessing.unwrap_or(self.manifest.postprocessing);
         let mask: Mask = post.mask_of(&probability)?;
         Ok(Segmentation { probability, mask })
-    }
-
-    fn described(&self, mirroring: Mirroring) -> String {
-        format!(
-            "{} (BLAKE3 {}) by {}, images of each: {}, {:?}",
-            self.manifest.name,
-            self.hash,
-            self.engine.describe(),
-            self.mirrors(mirroring).len(),
-            self.options.postprocessing.unwrap_or(self.manifest.postprocessing)
-        )
     }
 
     /// Softmax, summed over the foreground.
@@ -233,31 +215,42 @@ impl NetworkSegmenter {
 
 impl Segmenter for NetworkSegmenter {
     fn segment(&self, image: &Array2<f32>, watch: &Watch<'_>) -> Result<Segmentation, SegError> {
-        self.segmentation(image, self.options.mirroring, watch)
+        self.with_mask(self.probability(image, watch)?)
     }
 
-    /// The average over all mirror images, where it is not asked for anyway.
-    fn careful(&self) -> Option<Box<dyn Segmenter + '_>> {
-        let is_other = self.mirrors(Mirroring::All) != self.mirrors(self.options.mirroring);
-        is_other.then(|| Box::new(Mirrored(self)) as _)
+    /// The average over all mirror images: only those are run that are not among those before.
+    fn segment_again(
+        &self,
+        image: &Array2<f32>,
+        before: &Array2<f32>,
+        watch: &Watch<'_>,
+    ) -> Result<Option<Segmentation>, SegError> {
+        if before.dim() != image.dim() {
+            return Err(SegError::WrongShape { expected: image.dim(), found: before.dim() });
+        }
+        let seen = self.mirrors(self.options.mirroring);
+        let mut others = self.mirrors(Mirroring::All);
+        others.retain(|mirror| !seen.contains(mirror));
+        if others.is_empty() {
+            return Ok(None);
+        }
+        let mut probability = self.seen(image, &others, watch)?;
+        let [others, seen] = [others.len(), seen.len()].map(|images| images as f32);
+        probability.zip_mut_with(before, |other, before| {
+            *other = (*other * others + before * seen) / (others + seen);
+        });
+        self.with_mask(probability).map(Some)
     }
 
     fn describe(&self) -> String {
-        self.described(self.options.mirroring)
-    }
-}
-
-/// A [`NetworkSegmenter`] that averages over all mirror images.
-#[derive(Debug)]
-struct Mirrored<'a>(&'a NetworkSegmenter);
-
-impl Segmenter for Mirrored<'_> {
-    fn segment(&self, image: &Array2<f32>, watch: &Watch<'_>) -> Result<Segmentation, SegError> {
-        self.0.segmentation(image, Mirroring::All, watch)
-    }
-
-    fn describe(&self) -> String {
-        self.0.described(Mirroring::All)
+        format!(
+            "{} (BLAKE3 {}) by {}, images of each: {}, {:?}",
+            self.manifest.name,
+            self.hash,
+            self.engine.describe(),
+            self.mirrors(self.options.mirroring).len(),
+            self.options.postprocessing.unwrap_or(self.manifest.postprocessing)
+        )
     }
 }
 
