@@ -28,8 +28,8 @@ pub(crate) enum Node {
 
 pub(crate) type Storage = BTreeMap<String, Node>;
 
-/// Reads OpenCV's YAML. It is not YAML: the directive `%YAML:1.0` and the tag `!!opencv-matrix` are
-/// dropped before a YAML parser sees it.
+/// Reads OpenCV's YAML. It is not YAML: the directive `%YAML:1.0` and the tags of matrices are dropped
+/// before a YAML parser sees it.
 pub(crate) fn read_yaml(path: &Path, text: &str) -> Result<Storage, IoError> {
     let malformed = |line, reason: String| IoError::malformed(path, "OpenCV YAML", line, reason);
     let mut depth = 0usize;
@@ -47,15 +47,11 @@ pub(crate) fn read_yaml(path: &Path, text: &str) -> Result<Storage, IoError> {
             }
         }
     }
-    if text.contains("!!opencv-nd-matrix") {
-        let what = "matrices of more than two dimensions are not read".into();
-        return Err(IoError::Unsupported { path: path.to_owned(), what });
-    }
     // Lines stay where they are, so that an error's line number is the file's.
     let plain: String = text
         .lines()
         .map(|line| if line.starts_with('%') || line.trim_end() == "---" { "" } else { line })
-        .map(|line| line.replace("!!opencv-matrix", ""))
+        .map(|line| line.replace("!!opencv-matrix", "").replace("!!opencv-nd-matrix", ""))
         .collect::<Vec<_>>()
         .join("\n");
     serde_saphyr::from_str(&plain).map_err(|e| {
@@ -158,7 +154,8 @@ impl Open {
     }
 }
 
-/// The matrix under the first of `keys` that the storage has: `rows`, `cols`, `data`.
+/// The matrix under the first of `keys` that the storage has: `rows`, `cols`, `data`, or as OpenCV 5
+/// writes an array of one dimension, `sizes` and `data`, then a column.
 pub(crate) fn matrix(
     path: &Path,
     storage: &Storage,
@@ -172,13 +169,25 @@ pub(crate) fn matrix(
     let Node::Map(map) = node else {
         return Err(wrong("expected a matrix with rows, cols and data"));
     };
-    let count = |name: &str| match map.get(name) {
+    let count = |node: Option<&Node>| match node {
         Some(Node::Number(v)) if *v >= 1.0 && *v <= MAX_ENTRIES as f64 && v.fract() == 0.0 => {
             Ok(*v as usize)
         }
-        _ => Err(wrong("rows and cols must be whole numbers from 1 to 4096")),
+        _ => Err(wrong("its sizes must be whole numbers from 1 to 4096")),
     };
-    let (rows, cols) = (count("rows")?, count("cols")?);
+    let (rows, cols) = match map.get("sizes") {
+        None => (count(map.get("rows"))?, count(map.get("cols"))?),
+        Some(Node::List(sizes)) => match &sizes[..] {
+            [rows] => (count(Some(rows))?, 1),
+            [rows, cols] => (count(Some(rows))?, count(Some(cols))?),
+            _ => {
+                let reason = format!("has {} dimensions; expected 1 or 2", sizes.len());
+                return Err(IoError::field(path, key.as_str(), "", reason));
+            }
+        },
+        // XML does not tell a list of one from a number.
+        rows => (count(rows)?, 1),
+    };
     let data = match map.get("data") {
         Some(Node::List(list)) => list.as_slice(),
         Some(one @ Node::Number(_)) => std::slice::from_ref(one),

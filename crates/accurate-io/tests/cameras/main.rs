@@ -327,6 +327,65 @@ fn opencv_files_keep_two_sizes_and_write_one_size_plainly() {
     }
 }
 
+/// `numpy` arrays of one dimension, which OpenCV 5 writes under another tag and OpenCV 4 as columns.
+#[test]
+fn opencv_arrays_of_one_dimension_are_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str, text: String| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        read_cameras(&[path], &MM).map(|views| views[0].camera.clone())
+    };
+    let (k, d, t) = ("900. 0. 320. 0. 900. 240. 0. 0. 1.", "0.1 -0.2 0. 0. 0.05", "3. -4. 500.");
+    let yaml = |shape: fn(usize) -> String| {
+        let matrix = |name: &str, shape: &str, data: &str| {
+            let data = data.replace(' ', ", ");
+            format!("{name}: {shape}\n   dt: d\n   data: [ {data} ]\n")
+        };
+        let [k, r] = [("K", k), ("R", "1. 0. 0. 0. 1. 0. 0. 0. 1.")]
+            .map(|(name, data)| matrix(name, "!!opencv-matrix\n   rows: 3\n   cols: 3", data));
+        let (d, t) = (matrix("D", &shape(5), d), matrix("T", &shape(3), t));
+        read("c.yml", format!("%YAML:1.0\n---\n{k}{d}{r}{t}image_size: [ 640, 480 ]\n"))
+    };
+    let column = |n| format!("!!opencv-matrix\n   rows: {n}\n   cols: 1");
+    let expected = yaml(column).unwrap();
+    assert!(expected.distortion().is_some() && expected.t().z == 500.0);
+    let one = |n| format!("!!opencv-nd-matrix\n   sizes: [ {n} ]");
+    assert_eq!(yaml(one).unwrap(), expected);
+    let two = |n| format!("!!opencv-nd-matrix\n   sizes: [ 1, {n} ]");
+    assert_eq!(yaml(two).unwrap(), expected);
+
+    let xml = |sizes: fn(usize) -> String| {
+        let nd = |name: &str, n, data: &str| {
+            let sizes = sizes(n);
+            format!(
+                "<{name} type_id=\"opencv-nd-matrix\"><sizes>{sizes}</sizes><dt>d</dt>\
+                 <data>{data}</data></{name}>"
+            )
+        };
+        let square = |name: &str, data: &str| {
+            format!(
+                "<{name} type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt>\
+                 <data>{data}</data></{name}>"
+            )
+        };
+        let [k, r] = [square("K", k), square("R", "1. 0. 0. 0. 1. 0. 0. 0. 1.")];
+        let (d, t) = (nd("D", 5, d), nd("T", 3, t));
+        let size = "<image_size>640 480</image_size>";
+        read("c.xml", format!("<opencv_storage>{k}{d}{r}{t}{size}</opencv_storage>"))
+    };
+    assert_eq!(xml(|n| n.to_string()).unwrap(), expected);
+
+    let refused = |shape| yaml(shape).unwrap_err().to_string();
+    let three = |n| format!("!!opencv-nd-matrix\n   sizes: [ 1, {n}, 1 ]");
+    assert!(refused(three).contains("has 3 dimensions"), "{}", refused(three));
+    let short = |n| format!("!!opencv-nd-matrix\n   sizes: [ {} ]", n - 1);
+    assert!(refused(short).contains("2 x 1 entries stated, 3 given"), "{}", refused(short));
+    let none = |_| "!!opencv-nd-matrix\n   sizes: [ 0 ]".to_owned();
+    assert!(refused(none).contains("sizes must be whole"), "{}", refused(none));
+    assert!(xml(|n| format!("1 {n} 1")).unwrap_err().to_string().contains("3 dimensions"));
+}
+
 #[test]
 fn an_image_size_must_be_whole_positive_and_fit() {
     let folder = tempfile::tempdir().unwrap();
