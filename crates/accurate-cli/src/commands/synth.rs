@@ -1,3 +1,5 @@
+use std::fs;
+use std::ops::Range;
 use std::path::Path;
 
 use accurate3d::io::{BitDepth, GreyImage, PairContents, write_pair};
@@ -33,12 +35,13 @@ fn generate_cases(
     console: &Console,
 ) -> Result<(), Failure> {
     let options = case_options(&args.disturbances);
-    make_folder(out)?;
-    let bar = console.progress(args.count as usize, "generating");
     let last = args
         .first
         .checked_add(args.count)
         .ok_or_else(|| Failure::new(Failure::USAGE, "--first plus --count is too large"))?;
+    make_folder(out)?;
+    refuse_other_sets(out, &format!("{SOURCE} {family} seed {} ", args.seed), args.first..last)?;
+    let bar = console.progress(args.count as usize, "generating");
     (args.first..last).into_par_iter().try_for_each(|index| {
         let case = generate(family, args.seed, index, &options)?;
         let images = args.xray.then(|| xray_images(&case));
@@ -53,6 +56,36 @@ fn generate_cases(
     Ok(())
 }
 
+/// A folder holds cases of one family and seed: those of another one would be taken for more of them.
+///
+/// # Errors
+/// [`Failure::USAGE`] if an earlier run left a case of another `set` that this run does not write again.
+fn refuse_other_sets(out: &Path, set: &str, written: Range<u64>) -> Result<(), Failure> {
+    let unread = |error| Failure::new(Failure::IO, format!("{}: {error}", out.display()));
+    let mut others = Vec::new();
+    for entry in fs::read_dir(out).map_err(unread)? {
+        let entry = entry.map_err(unread)?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let index = name.strip_prefix("case_").and_then(|index| index.parse::<u64>().ok());
+        let stays = index.is_some_and(|index| !written.contains(&index));
+        let is_other = |source: String| source.starts_with(SOURCE) && !source.starts_with(set);
+        if stays && source_of(&entry.path()).is_some_and(is_other) {
+            others.push(name);
+        }
+    }
+    let Some(first) = others.iter().min() else { return Ok(()) };
+    let message =
+        format!("{} holds {} cases of another set, as {first}", out.display(), others.len());
+    Err(Failure::new(Failure::USAGE, message)
+        .with_hint("give another --out, or remove that folder first"))
+}
+
+/// What made a case, by its `meta.json`.
+fn source_of(case: &Path) -> Option<String> {
+    let described: Value = serde_json::from_str(&read_text(&case.join("meta.json")).ok()?).ok()?;
+    described["source"].as_str().map(str::to_owned)
+}
+
 /// Removes what an earlier run wrote to a case's folder and this run will not: images belong to the
 /// cameras and the curve that they were drawn with. `meta.json` goes too, as the mark of a whole pair.
 ///
@@ -60,10 +93,7 @@ fn generate_cases(
 /// [`Failure::USAGE`] for a folder that is not of this command.
 fn remove_earlier(dir: &Path, draws_images: bool) -> Result<(), Failure> {
     let meta = dir.join("meta.json");
-    let described: Option<Value> =
-        read_text(&meta).ok().and_then(|t| serde_json::from_str(&t).ok());
-    let source = described.as_ref().and_then(|value| value["source"].as_str());
-    let is_ours = source.is_some_and(|source| source.starts_with(SOURCE));
+    let is_ours = source_of(dir).is_some_and(|source| source.starts_with(SOURCE));
     let mut stale = ["L", "R"].map(|view| dir.join(format!("images/view_{view}.png"))).to_vec();
     stale.retain(|image| !draws_images && image.is_file());
     // Without both, it is a run that was stopped, which begins anew.
@@ -75,7 +105,7 @@ fn remove_earlier(dir: &Path, draws_images: bool) -> Result<(), Failure> {
     stale.iter().try_for_each(|image| remove_file(image))?;
     if !draws_images {
         // Left where it holds something else.
-        let _ = std::fs::remove_dir(dir.join("images"));
+        let _ = fs::remove_dir(dir.join("images"));
     }
     remove_file(&meta)
 }

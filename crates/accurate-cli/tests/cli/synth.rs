@@ -27,6 +27,31 @@ fn synth_writes_pairs_that_reconstruct() {
     assert_eq!(text.lines().count(), 3);
 }
 
+/// A shorter run of another family or seed would leave the longer one's last cases among its own.
+#[test]
+fn cases_of_another_set_are_not_left_beside_new_ones() {
+    let dir = TempDir::new().unwrap();
+    let synth = |seed: &str, first: &str, count: &str| {
+        let mut command = accurate();
+        command.args(["synth", "easy", "-q", "--seed", seed, "--first", first, "--count", count]);
+        command.arg("--out").arg(dir.path());
+        command
+    };
+    stdout(&mut synth("1500", "0", "2"));
+    stdout(&mut synth("1500", "2", "1"));
+    let meta = |case: &str| fs::read(dir.path().join(case).join("meta.json")).unwrap();
+    let before = meta("case_000");
+    let (code, said) = failure(&mut synth("1501", "0", "1"));
+    assert_eq!(code, 2, "{said}");
+    assert!(said.contains("2 cases of another set, as case_001"), "{said}");
+    assert_eq!(meta("case_000"), before);
+    // All of them are written again, and what others have put there stays.
+    fs::create_dir(dir.path().join("case_007")).unwrap();
+    stdout(&mut synth("1501", "0", "3"));
+    assert_ne!(meta("case_000"), before);
+    assert!(dir.path().join("case_007").is_dir());
+}
+
 /// `accurate synth xray` on small images.
 fn xray(shards: &Path, count: &str, threads: &str) -> Command {
     let mut command = accurate();
