@@ -74,8 +74,8 @@ fn refuse_other_sets(out: &Path, set: &str, written: Range<u64>) -> Result<(), F
         }
     }
     let Some(first) = others.iter().min() else { return Ok(()) };
-    let message =
-        format!("{} holds {} cases of another set, as {first}", out.display(), others.len());
+    let (folder, n) = (out.display(), others.len());
+    let message = format!("{folder} holds cases of another set ({n}, the first {first})");
     Err(Failure::new(Failure::USAGE, message)
         .with_hint("give another --out, or remove that folder first"))
 }
