@@ -173,26 +173,24 @@ pub(crate) fn matrix(
         Some(Node::Number(v)) if *v >= 1.0 && *v <= MAX_ENTRIES as f64 && v.fract() == 0.0 => {
             Ok(*v as usize)
         }
-        _ => Err(wrong("its sizes must be whole numbers from 1 to 4096")),
+        _ => Err(wrong("rows, cols or sizes must be whole numbers from 1 to 4096")),
     };
-    let (rows, cols) = match map.get("sizes") {
+    // XML does not tell a list of one from a number.
+    let list = |name: &str| match map.get(name) {
+        Some(Node::List(list)) => Some(list.as_slice()),
+        Some(one @ Node::Number(_)) => Some(std::slice::from_ref(one)),
+        _ => None,
+    };
+    let (rows, cols) = match list("sizes") {
         None => (count(map.get("rows"))?, count(map.get("cols"))?),
-        Some(Node::List(sizes)) => match &sizes[..] {
-            [rows] => (count(Some(rows))?, 1),
-            [rows, cols] => (count(Some(rows))?, count(Some(cols))?),
-            _ => {
-                let reason = format!("has {} dimensions; expected 1 or 2", sizes.len());
-                return Err(IoError::field(path, key.as_str(), "", reason));
-            }
-        },
-        // XML does not tell a list of one from a number.
-        rows => (count(rows)?, 1),
+        Some([rows]) => (count(Some(rows))?, 1),
+        Some([rows, cols]) => (count(Some(rows))?, count(Some(cols))?),
+        Some(sizes) => {
+            let reason = format!("has {} dimensions; expected 1 or 2", sizes.len());
+            return Err(IoError::field(path, key.as_str(), "", reason));
+        }
     };
-    let data = match map.get("data") {
-        Some(Node::List(list)) => list.as_slice(),
-        Some(one @ Node::Number(_)) => std::slice::from_ref(one),
-        _ => return Err(wrong("data must be a list of numbers")),
-    };
+    let data = list("data").ok_or_else(|| wrong("data must be a list of numbers"))?;
     if rows * cols > MAX_ENTRIES || data.len() != rows * cols {
         let reason = format!("{rows} x {cols} entries stated, {} given", data.len());
         return Err(IoError::field(path, key.as_str(), "", reason));
