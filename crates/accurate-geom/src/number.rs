@@ -134,25 +134,33 @@ impl<S: Simd> Number for Vector<S> {
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
         let larger = self.simd.greater_than_f64s(self.lanes, other.lanes);
-        self.with(self.simd.select_f64s(larger, self.lanes, other.lanes))
+        self.with(select(self.simd, larger, self.lanes, other.lanes))
     }
     #[inline(always)]
     fn smaller(self, other: Self) -> Self {
         let smaller = self.simd.less_than_f64s(self.lanes, other.lanes);
-        self.with(self.simd.select_f64s(smaller, self.lanes, other.lanes))
+        self.with(select(self.simd, smaller, self.lanes, other.lanes))
     }
     #[inline(always)]
     fn if_positive(self, then: Self, otherwise: Self) -> Self {
         let positive = self.simd.greater_than_f64s(self.lanes, self.simd.splat_f64s(0.0));
-        self.with(self.simd.select_f64s(positive, then.lanes, otherwise.lanes))
+        self.with(select(self.simd, positive, then.lanes, otherwise.lanes))
     }
     #[inline(always)]
     fn all_at_most(self, limit: f64) -> bool {
         let simd = self.simd;
         let within = simd.less_than_or_equal_f64s(self.lanes, simd.splat_f64s(limit));
-        let beyond = simd.select_f64s(within, simd.splat_f64s(0.0), simd.splat_f64s(1.0));
+        let beyond = select(simd, within, simd.splat_f64s(0.0), simd.splat_f64s(1.0));
         simd.reduce_max_f64s(beyond) == 0.0
     }
+}
+
+/// As `select_f64s`, which is no part of its caller's code unless the program is linked as a whole, and
+/// then takes most of the time of a search.
+#[inline(always)]
+fn select<S: Simd>(simd: S, mask: S::m64s, then: S::f64s, otherwise: S::f64s) -> S::f64s {
+    let bits = |lanes| simd.transmute_u64s_f64s(lanes);
+    simd.transmute_f64s_u64s(simd.select_u64s(mask, bits(then), bits(otherwise)))
 }
 
 /// Two numbers in step: while one waits for a division, the other goes on.

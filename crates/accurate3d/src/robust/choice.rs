@@ -5,6 +5,7 @@ use super::candidates::ViewCandidates;
 use super::evidence::{Evidence, Walks};
 use super::score::Candidate;
 use super::search::{Search, Tried};
+use super::side_by_side::side_by_side;
 use crate::Error;
 
 /// Curves nowhere farther apart than this do not compete, px.
@@ -32,10 +33,10 @@ impl Settled {
         view2: &ViewCandidates<View2>,
     ) -> Self {
         let least = choice.finalists[0].score;
-        let contenders =
-            choice.finalists.iter().take_while(|c| c.score <= least + search.params.contenders);
-        let (mut fits, mut calibrations): (Vec<_>, Vec<_>) =
-            contenders.map(|c| search.last_fit(c, given_rig)).unzip();
+        let close = |c: &&Candidate| c.score <= least + search.params.contenders;
+        let contenders: Vec<_> = choice.finalists.iter().take_while(close).collect();
+        let last_fits = side_by_side(&contenders, |c| search.last_fit(c, given_rig));
+        let (mut fits, mut calibrations): (Vec<_>, Vec<_>) = last_fits.into_iter().unzip();
         let first = (0..fits.len())
             .min_by(|&a, &b| fits[a].unlikeliness().total_cmp(&fits[b].unlikeliness()))
             .unwrap_or(0);
@@ -132,7 +133,7 @@ pub(crate) fn choose(
     let (mut found, mut tried, mut fits) = (Vec::new(), Vec::new(), 0);
     if let Some(earlier) = earlier {
         // All with the same freedom, or the freest would win.
-        found.extend(earlier.finalists.into_iter().map(|finalist| search.usual(finalist)));
+        found = side_by_side(&earlier.finalists, |finalist| search.usual(finalist.clone()));
         (tried, fits) = (earlier.tried, earlier.fits);
     }
     let before = found.len();
@@ -162,14 +163,16 @@ pub(crate) fn choose(
             more.append(&mut finalists);
             finalists = search.finalists(more);
         }
-        let fine: Vec<_> = finalists.iter().filter_map(|c| search.finer(c)).collect();
+        let fine = side_by_side(&finalists, |candidate| search.finer(candidate));
+        let fine: Vec<_> = fine.into_iter().flatten().collect();
         if !fine.is_empty() {
             finalists = search.finalists(fine);
         }
         if !is_good(&finalists) {
+            let first = &finalists[..params.repaired.min(finalists.len())];
+            let tries = side_by_side(first, |candidate| search.repaired(candidate));
             let mut repaired = Vec::new();
-            for candidate in finalists.iter_mut().take(params.repaired) {
-                let better = search.repaired(candidate);
+            for (candidate, better) in finalists.iter_mut().zip(tries) {
                 if better.score < candidate.score {
                     repaired.push(better);
                 } else {

@@ -4,6 +4,7 @@ use accurate_match::longest_chain;
 use super::score::Candidate;
 use super::search::{BRIDGED_PX, Effort, PLAIN, SAME_PX, Search};
 use super::shape::{dense, px_per_unit};
+use super::side_by_side::side_by_side;
 use super::start::through;
 
 /// Curves run together where they are no farther apart than this, px ...
@@ -54,20 +55,21 @@ impl Search<'_> {
         };
         let points = dense(&best.fit.curve, self.rig);
         let px_per_unit = px_per_unit(&points, self.rig);
-        let mut crosses = Vec::new();
-        for other in rest.iter().take(others) {
+        let cross = |other: &Candidate| {
             let theirs = dense(&other.fit.curve, self.rig);
             let is_seen = |point: &Point3| {
                 let [_, reach_px] = BRIDGED_PX;
                 [best, other].iter().all(|c| !self.is_near(&c.cuts, point, reach_px))
             };
+            let mut crosses = Vec::new();
             for points in crossed(&points, &theirs, px_per_unit, is_seen) {
                 let start = through(&points, px_per_unit);
                 let fit = start.and_then(|start| self.fit(&start, &PLAIN));
                 crosses.extend(fit.map(|fit| best.crossed(other, fit, self.rig, self.params)));
             }
-        }
-        crosses
+            crosses
+        };
+        side_by_side(&rest[..rest.len().min(others)], cross).concat()
     }
 }
 

@@ -10,6 +10,7 @@ use super::joint::JointResult;
 use super::look::Seen;
 use super::score::Candidate;
 use super::search::SAME_PX;
+use super::side_by_side::side_by_side;
 use crate::IntensityDiagnostics;
 
 /// A curve of the maps is right to a few pixels or is another curve: what is carried farther than this,
@@ -26,6 +27,9 @@ const MOST_CONTRAST_TO_NOISE: f64 = 1000.0;
 const COST_PER_SCORE: f64 = 6.0;
 /// What the pictures must speak for another curve by, as a score: neighbouring pixels repeat each other.
 const LEAD: f64 = 4.0;
+/// What the fits that are compared may still gain by a step, half squares: little beside what the lead is
+/// made of.
+const ASKED_TO: f64 = 0.5;
 /// Most curves that are asked after, the one of the maps among them.
 const MOST_ASKED: usize = 5;
 
@@ -45,21 +49,28 @@ pub(crate) fn choose_by_grey_levels(
     let curve = |k: usize| &contenders[k].0.fit.curve;
     let curves: Vec<_> = asked.iter().map(|&k| curve(k)).collect();
     let calibration = start_of_calibration(params, seen.calibration());
-    let settings = IntensityFitParams::DEFAULT;
+    let settings = IntensityFitParams { tolerance: ASKED_TO, ..IntensityFitParams::DEFAULT };
     let pair = IntensityPair::around(&curves, images, given_rig, &settings, calibration).ok()?;
-    let best = pair.fit(curves[0]).ok()?;
+    let fits = side_by_side(&curves, |curve| pair.fit(curve).ok());
+    let best = fits[0].as_ref()?;
     let fitted_last = seen.fitted_last();
     // One that had no last fit is placed by the pictures or not at all; alone, where the other curves are
     // background.
     let stands = |k: usize| {
         k < fitted_last
-            || fit_intensities(curve(k), images, given_rig, &settings, calibration)
-                .is_ok_and(|fit| reason_against(&fit).is_none())
+            || fit_intensities(
+                curve(k),
+                images,
+                given_rig,
+                &IntensityFitParams::DEFAULT,
+                calibration,
+            )
+            .is_ok_and(|fit| reason_against(&fit).is_none())
     };
     let mut behind = Vec::new();
-    for &k in &asked[1..] {
+    for (&k, fit) in asked.iter().zip(&fits).skip(1) {
         // What is carried off is no longer the curve that the maps spoke for.
-        let fit = pair.fit(curve(k)).ok().filter(|fit| fit.moved_px <= MOST_MOVED_PX);
+        let fit = fit.as_ref().filter(|fit| fit.moved_px <= MOST_MOVED_PX);
         let Some(fit) = fit else { continue };
         behind.push((contenders[k].1 + (fit.cost - best.cost) / COST_PER_SCORE, k));
     }

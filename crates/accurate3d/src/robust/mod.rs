@@ -16,6 +16,7 @@ mod ring;
 mod score;
 mod search;
 mod shape;
+mod side_by_side;
 mod start;
 mod strays;
 mod suspicion;

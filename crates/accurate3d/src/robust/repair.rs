@@ -5,6 +5,7 @@ use super::candidates::ViewCandidates;
 use super::score::Candidate;
 use super::search::{Search, Tried};
 use super::shape::{dense, is_shown_near, px_per_unit};
+use super::side_by_side::side_by_side;
 use super::start::through;
 use crate::Error;
 
@@ -46,17 +47,13 @@ impl Search<'_> {
             lambda3_start: from.settings.lambda3,
             ..OutlineFitParams::DEFAULT
         };
-        let refit = |start: Option<Curve3>, params: &OutlineFitParams| {
-            let fit = self.fit(&start?, params)?;
-            Some(from.refitted(fit, from.settings, self.rig))
-        };
         // With the same freedom as what it is compared with.
         let annealed = OutlineFitParams {
             knot_spacing_px: from.settings.knot_spacing_px,
             lambda3: from.settings.lambda3,
             ..OutlineFitParams::ANNEALED
         };
-        let mut moves: Vec<Option<Candidate>> = vec![refit(Some(curve.clone()), &annealed)];
+        let mut starts = vec![(curve.clone(), annealed)];
         let points = dense(curve, self.rig);
         let px_per_unit = px_per_unit(&points, self.rig);
         for at_end in [false, true] {
@@ -65,10 +62,14 @@ impl Search<'_> {
             for px in longer.iter().copied().chain(SHORTER_PX.map(|px| -px)) {
                 let moved = with_end_moved(&points, px_per_unit, at_end, px);
                 let start = moved.and_then(|points| through(&points, px_per_unit));
-                moves.push(refit(start, &plain));
+                starts.extend(start.map(|start| (start, plain)));
             }
         }
-        moves.into_iter().flatten().collect()
+        let refitted = |(start, params): &(Curve3, OutlineFitParams)| {
+            let fit = self.fit(start, params)?;
+            Some(from.refitted(fit, from.settings, self.rig))
+        };
+        side_by_side(&starts, refitted).into_iter().flatten().collect()
     }
 
     /// Whether there is unexplained outline within reach of an end.

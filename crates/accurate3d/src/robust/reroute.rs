@@ -6,6 +6,7 @@ use super::other_ways::{OtherWay, other_ways};
 use super::score::Candidate;
 use super::search::{Effort, PLAIN, SAME_PX, SETTLED, Search};
 use super::shape::{Shape, dense, px_per_unit};
+use super::side_by_side::side_by_side;
 use super::start::{PRICES, start_from, through};
 
 /// Other ways of a candidate that are tried, and candidates whose ways are: without much effort ...
@@ -26,19 +27,21 @@ impl Search<'_> {
             Effort::Quick => QUICKLY,
             Effort::Thorough => THOROUGHLY,
         };
-        let mut rerouted = Vec::new();
-        for candidate in finalists.iter().take(candidates) {
+        let elsewhere = |candidate: &Candidate| {
             let starts = self.starts_elsewhere(candidate).filter(|start| {
                 let shape = Shape::new(start, self.rig);
                 !finalists.iter().any(|known| shape.is_along(&known.shape, SAME_PX))
             });
-            rerouted.extend(starts.take(most).filter_map(|start| {
-                let fit = self.fit(&start, &PLAIN)?;
+            let others = side_by_side(&starts.take(most).collect::<Vec<_>>(), |start| {
+                let fit = self.fit(start, &PLAIN)?;
                 let mut other = candidate.refitted(fit, SETTLED, self.rig);
                 other.good = other.is_good(self.params);
                 Some(other)
-            }));
-        }
+            });
+            others.into_iter().flatten().collect::<Vec<_>>()
+        };
+        let tried = &finalists[..finalists.len().min(candidates)];
+        let mut rerouted = side_by_side(tried, elsewhere).concat();
         let fits = rerouted.len();
         if self.effort == Effort::Quick {
             let least = finalists.first().map_or(f64::INFINITY, |best| best.score);

@@ -9,6 +9,7 @@ use super::RobustParams;
 use super::candidates::{ViewCandidates, free_ends};
 use super::score::{Candidate, CutEnds, Origin};
 use super::shape::{Shape, arc_lengths_px, dense, is_shown_near, px_per_unit};
+use super::side_by_side::side_by_side;
 use super::start::{OTHER_PRICES, PRICES, start_from};
 use crate::Error;
 
@@ -126,6 +127,7 @@ impl Search<'_> {
         let proposals = propose_pairs(&angles, &signals1, &signals2, &params).map_err(matching)?;
         // Pairs that were looked at, and those among them that start another fit.
         let (mut count, mut fits) = (0, 0);
+        let mut starts = Vec::new();
         for proposal in &proposals {
             let proposal =
                 Proposal { i: proposal.i + from[0], j: proposal.j + from[1], ..*proposal };
@@ -142,12 +144,22 @@ impl Search<'_> {
                 continue;
             }
             fits += 1;
-            let good = found.iter().filter(|c| c.good).map(|c| c.score).min_by(f64::total_cmp);
-            let judged = self.judged(&start, good);
-            let wholly = judged.as_ref().is_none_or(|judged| judged.wholly);
-            tried.push(Tried { proposal, start: start.shape, wholly });
-            found.extend(judged.map(|judged| judged.candidate));
+            let mut wholly = true;
+            let shape = start.shape.clone();
+            if self.effort == Effort::Thorough {
+                starts.push(start);
+            } else {
+                let good = found.iter().filter(|c| c.good).map(|c| c.score).min_by(f64::total_cmp);
+                if let Some(judged) = self.judged(&start, good) {
+                    wholly = judged.wholly;
+                    found.push(judged.candidate);
+                }
+            }
+            tried.push(Tried { proposal, start: shape, wholly });
         }
+        // With much effort no fit decides about the next.
+        let judged = side_by_side(&starts, |start| self.judged(start, None));
+        found.extend(judged.into_iter().flatten().map(|judged| judged.candidate));
         Ok(proposals.len())
     }
 
@@ -253,8 +265,14 @@ impl Search<'_> {
         view1: &ViewCandidates<View1>,
         view2: &ViewCandidates<View2>,
     ) -> Vec<Candidate> {
-        let mut more = Vec::new();
-        for candidate in finalists.iter().take(3) {
+        let restarts = |candidate: &Candidate| {
+            let mut more = Vec::new();
+            for reach_px in BRIDGED_PX {
+                let bridged = self.bridged(candidate, reach_px);
+                if let Some(fit) = bridged.and_then(|start| self.fit(&start, &PLAIN)) {
+                    more.push(candidate.refitted(fit, SETTLED, self.rig));
+                }
+            }
             let [i, j] = candidate.walks;
             let start = start_from(
                 &OTHER_PRICES,
@@ -264,19 +282,13 @@ impl Search<'_> {
                 self.rig,
                 OutlineFitParams::DEFAULT.knot_spacing_px,
             );
-            for reach_px in BRIDGED_PX {
-                let bridged = self.bridged(candidate, reach_px);
-                if let Some(fit) = bridged.and_then(|start| self.fit(&start, &PLAIN)) {
-                    more.push(candidate.refitted(fit, SETTLED, self.rig));
-                }
-            }
-            let Some((start, _)) = start else { continue };
+            let Some((start, _)) = start else { return more };
             if self.effort == Effort::Quick {
                 let shape = Shape::new(&start, self.rig);
                 if shape.is_along(&candidate.shape, SAME_START_PX)
                     || tried.iter().any(|t| t.start.is_like(&shape, SAME_FIT_PX))
                 {
-                    continue;
+                    return more;
                 }
             }
             for params in [PLAIN, ANNEALED] {
@@ -284,8 +296,9 @@ impl Search<'_> {
                     more.push(candidate.refitted(fit, SETTLED, self.rig));
                 }
             }
-        }
-        more
+            more
+        };
+        side_by_side(&finalists[..finalists.len().min(3)], restarts).concat()
     }
 
     /// A start that leaves out what is near the ends of bridges, px in either view, and spans it
