@@ -9,6 +9,8 @@ use super::shape::{Shape, px_per_unit_along};
 /// What bears on whether a chosen curve is the right one, all known without the truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Evidence {
+    /// Boundary points of both outlines.
+    pub boundary_points: usize,
     /// Outline that the curve does not explain, cut faces at bridges aside; 0 at the truth.
     pub unexplained: f64,
     /// Curve that the masks do not show; 0 at the truth.
@@ -101,6 +103,7 @@ impl Evidence {
     ) -> Self {
         let judgement = &best.fit.judgement;
         Self {
+            boundary_points: judgement.points[0] + judgement.points[1],
             unexplained: best.misfit - judgement.outside,
             outside: judgement.outside,
             chi_per_point: judgement.chi_per_point(),

@@ -33,7 +33,8 @@ pub struct RobustParams {
     pub contenders: f64,
     /// Finalists that are repaired if none is good.
     pub repaired: usize,
-    /// A fit is good if it leaves less than this unexplained or outside.
+    /// A fit is good if it leaves less than this unexplained or outside; of outlines of more than 3,000
+    /// points more in proportion.
     pub good_unexplained: f64,
     /// A fit is good if its mean squared residual is below this, px²; 1/18 at the truth.
     pub good_chi_per_point: f64,

@@ -25,6 +25,15 @@ const SURPRISE_PER_SCORE: f64 = 12.0;
 /// that losing points is no gain.
 const UNUSED_PX2: f64 = 1.0 / 18.0;
 
+/// Boundary points of both views up to which a limit of what is unexplained holds as it is.
+const USUAL_POINTS: f64 = 3000.0;
+
+/// By how much more a curve may leave unexplained for so many boundary points: the misfits of a few tenths
+/// of a px that a right one has in its tightest bends add up along it.
+pub(super) fn allowance(boundary_points: usize) -> f64 {
+    (boundary_points as f64 / USUAL_POINTS).max(1.0)
+}
+
 /// Where a walk takes a bridge, `[x, y]`, by view: there the outline is the cut face of something that
 /// hides the body.
 pub(crate) type CutEnds = [Vec<[f64; 2]>; 2];
@@ -180,7 +189,8 @@ impl Candidate {
 
     /// Whether nothing speaks against it.
     pub(crate) fn is_good(&self, params: &RobustParams) -> bool {
-        self.misfit < params.good_unexplained
+        let points = self.fit.judgement.points;
+        self.misfit < allowance(points[0] + points[1]) * params.good_unexplained
             && self.fit.judgement.chi_per_point() < params.good_chi_per_point
             && self.mean_distance_px < params.good_distance_px
     }

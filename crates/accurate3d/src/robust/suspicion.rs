@@ -3,6 +3,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::evidence::Evidence;
+use super::score::allowance;
 
 /// A reason to doubt a reconstruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -91,7 +92,7 @@ pub(crate) fn suspicions(evidence: &Evidence, limits: &Limits) -> Vec<Suspicion>
     let bridged = e.bridges > 0 && e.overlap < OVERLAP_AT_BRIDGES;
     let unexplained = if bridged { l.unexplained_at_bridges } else { l.unexplained };
     [
-        (e.unexplained > unexplained, Suspicion::UnexplainedOutline),
+        (e.unexplained > allowance(e.boundary_points) * unexplained, Suspicion::UnexplainedOutline),
         (e.outside > OUTSIDE, Suspicion::OutsideMask),
         (e.chi_per_point > l.chi_per_point_px2, Suspicion::Misfit),
         (has_rival(e, l.margin), Suspicion::Ambiguous),
@@ -160,6 +161,7 @@ mod tests {
     }
 
     const GOOD: Evidence = Evidence {
+        boundary_points: 2600,
         unexplained: 0.0,
         outside: 0.0,
         chi_per_point: 1.0 / 18.0,
@@ -192,6 +194,16 @@ mod tests {
         for (evidence, reason) in cases {
             assert_eq!(of_masks(&evidence), [reason]);
         }
+    }
+
+    #[test]
+    fn a_long_outline_may_leave_more_unexplained_in_proportion() {
+        let long = Evidence { boundary_points: 9000, unexplained: 0.1, ..GOOD };
+        assert!(of_masks(&long).is_empty());
+        let shorter = Evidence { boundary_points: 6000, ..long };
+        assert_eq!(of_masks(&shorter), [Suspicion::UnexplainedOutline]);
+        let short = Evidence { boundary_points: 800, unexplained: 0.03, ..GOOD };
+        assert!(of_masks(&short).is_empty());
     }
 
     #[test]
