@@ -3,8 +3,9 @@
 //!
 //! Every line shows what the method says about itself (un, off, chi per point, margin, mean epipolar
 //! distance) and what the truth says (Hausdorff in px, Overall and Max of the table in world units).
-//! `oracle` is the score of the fit that starts from the truth: a wrong result with a *higher* score
-//! was not found by the search, one with a lower score was preferred to the truth.
+//! `L` is how unlikely the curve is, as finalists are compared, `oracle` the same of the fit that starts
+//! from the truth: a right curve that is likelier was not found by the search, one that is less likely was
+//! passed over for what was taken.
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;
@@ -13,7 +14,8 @@ use std::time::Instant;
 
 use accurate3d::eval::{curve_scores, table_scores};
 use accurate3d::fit::{
-    CalibrationPriors, Outline, OutlineFitParams, OutlinePair, fit_outlines, judge_curve,
+    AdaptiveParams, CalibrationPriors, Outline, OutlineFitParams, OutlinePair,
+    fit_outlines_adaptively,
 };
 use accurate3d::geom::{Curve3, Point3, Rig, View1, View2};
 use accurate3d::synth::{CalibrationError, CaseOptions, Family, generate};
@@ -106,31 +108,29 @@ fn study(
         let sparse: Vec<_> = points.iter().step_by(5).copied().collect();
         Curve3::interpolate(&sparse).ok()
     };
-    let oracle = fitted(&truth)
-        .and_then(|t| fit_outlines(&t, &outlines, &rig, &OutlineFitParams::DEFAULT).ok())
-        .map_or_else(
-            || "none".to_owned(),
-            |fit| {
-                let j = fit.judgement;
-                let score = j.score() - 5.0 * j.bending;
-                format!(
-                    "{score:7.2} un {:.2} off {:.2} {:.4}",
-                    j.unexplained,
-                    j.outside,
-                    j.chi_per_point()
-                )
-            },
-        );
-    let own = fitted(&curve)
-        .and_then(|c| judge_curve(&c, &outlines, &rig, &OutlineFitParams::DEFAULT).ok())
-        .map_or(f64::NAN, |j| j.score() - 5.0 * j.bending);
+    // As finalists are compared, the walks' cost aside.
+    let unlikeliness = |points: &[Point3]| {
+        let start = fitted(points)?;
+        let (settings, adaptive) = (OutlineFitParams::DEFAULT, AdaptiveParams::DEFAULT);
+        let fit = fit_outlines_adaptively(&start, &outlines, &rig, &settings, &adaptive).ok()?;
+        let judgement = fit.judgement;
+        Some((fit.surprise? / 12.0 + 2.0 * (judgement.unexplained + judgement.outside), judgement))
+    };
+    let own = unlikeliness(&curve).map_or(f64::NAN, |(own, _)| own);
+    let oracle = unlikeliness(&truth).map_or_else(
+        || "none".to_owned(),
+        |(truth, j)| {
+            let (un, off, chi) = (j.unexplained, j.outside, j.chi_per_point());
+            format!("{truth:7.2} un {un:.2} off {off:.2} {chi:.4}")
+        },
+    );
 
     let d = &found.diagnostics;
     let o = d.outline.ok_or("no outline diagnostics")?;
     let hausdorff_px = scores.hausdorff / unit_per_px;
     let suspect = !d.suspicions.is_empty();
     let text = format!(
-        "{index:3} {:6.0} ms fits {:3} un {:6.2} off {:6.2} chi {:.4} margin {:7.2} dist {:5.2} cov {:.3} {:.3} | H {hausdorff_px:6.2} px overall {:.3} px table {:.3} {:.2} | F {own:7.2} oracle {oracle}{}{}",
+        "{index:3} {:6.0} ms fits {:3} un {:6.2} off {:6.2} chi {:.4} margin {:7.2} dist {:5.2} cov {:.3} {:.3} | H {hausdorff_px:6.2} px overall {:.3} px table {:.3} {:.2} | L {own:7.2} oracle {oracle}{}{}",
         1e3 * seconds,
         o.fits,
         o.unexplained,

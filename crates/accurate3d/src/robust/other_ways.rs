@@ -8,9 +8,13 @@ const ON_EACH_OTHER_PX: f64 = 1.3;
 /// What is shorter is a crossing, px.
 const SHORTEST_PX: usize = 8;
 /// Longer loops are left to the walks, px.
-const LONGEST_LOOP_PX: usize = 150;
-/// A loop promises as much as a stretch side by side that is so long, px.
+const LONGEST_LOOP_PX: usize = 300;
+/// A loop promises as much as a stretch side by side that is so long, px ...
 const LOOP_PROMISE_PX: f64 = 25.0;
+/// ... and one whose ends touch but do not cross, px.
+const TOUCH_PROMISE_PX: f64 = 24.0;
+/// Touches no farther apart along either strand are one, px.
+const ONE_TOUCH_PX: usize = 8;
 
 /// Another way that a curve may take through a view, with nearly the same outline.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,17 +29,24 @@ pub(crate) struct OtherWay {
 
 /// The other ways of a path whose vertices are 1 px apart: two strands side by side, whose bodies are
 /// one in the image (no farther apart than `reach_px`), change places, along the whole stretch or where
-/// they lie on each other; a loop is run through the other way.
+/// they lie on each other; a loop, whose ends cross or touch, is run through the other way.
 ///
 /// O(vertices²), about 0.2 ms for 450.
 pub(crate) fn other_ways(path: &[Point2], reach_px: f64) -> Vec<OtherWay> {
     let swaps = side_by_side(path, reach_px).into_iter().map(|pairs| exchanged(path, &pairs));
-    let turned = loops(path).into_iter().map(|range| {
-        let mut path = path.to_vec();
-        path[range[0]..=range[1]].reverse();
-        OtherWay { path, range, promise_px: LOOP_PROMISE_PX }
-    });
-    swaps.chain(turned).collect()
+    let crossings = loops(path);
+    let touches = touches(path, &crossings);
+    let turned = |promise_px| {
+        move |[from, to]: [usize; 2]| {
+            let mut path = path.to_vec();
+            path[from..=to].reverse();
+            OtherWay { path, range: [from, to], promise_px }
+        }
+    };
+    swaps
+        .chain(crossings.into_iter().map(turned(LOOP_PROMISE_PX)))
+        .chain(touches.into_iter().map(turned(TOUCH_PROMISE_PX)))
+        .collect()
 }
 
 /// A vertex and its neighbour on another strand, later in the path.
@@ -139,6 +150,35 @@ fn loops(path: &[Point2]) -> Vec<[usize; 2]> {
     all
 }
 
+/// Where the path touches itself beside its `crossings`: the vertices between.
+fn touches(path: &[Point2], crossings: &[[usize; 2]]) -> Vec<[usize; 2]> {
+    let last = path.len().saturating_sub(1);
+    let squared = |i: usize, j: usize| (path[i] - path[j]).norm_squared();
+    let is_one = |a: &[usize; 2], b: &[usize; 2]| {
+        a[0].abs_diff(b[0]) <= ONE_TOUCH_PX && a[1].abs_diff(b[1]) <= ONE_TOUCH_PX
+    };
+    let mut all: Vec<([usize; 2], f64)> = Vec::new();
+    for i in 1..last {
+        for j in i + 2 * SHORTEST_PX..(i + LONGEST_LOOP_PX).min(last) {
+            let apart = squared(i, j);
+            let is_least =
+                || (i - 1..=i + 1).all(|i| (j - 1..=j + 1).all(|j| apart <= squared(i, j)));
+            if apart < ON_EACH_OTHER_PX * ON_EACH_OTHER_PX && is_least() {
+                all.push(([i + 1, j], apart));
+            }
+        }
+    }
+    // Of one touch the nearest vertices.
+    all.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut kept: Vec<[usize; 2]> = Vec::new();
+    for (touch, _) in all {
+        if crossings.iter().chain(&kept).all(|known| !is_one(known, &touch)) {
+            kept.push(touch);
+        }
+    }
+    kept
+}
+
 #[cfg(test)]
 mod tests {
     use accurate_geom::Polyline;
@@ -201,6 +241,28 @@ mod tests {
         // What is outside of the loop stays.
         assert_eq!(way.path[..20], there[..20]);
         assert_eq!(way.path[way.path.len() - 25..], there[there.len() - 25..]);
+    }
+
+    /// Out, around and back to 1 px from where it came by.
+    #[test]
+    fn a_loop_whose_ends_touch_is_run_through_the_other_way_too() {
+        let there = path(&[
+            [0.0, 0.0],
+            [40.0, 0.0],
+            [40.0, 40.0],
+            [20.0, 40.0],
+            [20.0, 1.0],
+            [-30.0, 40.0],
+        ]);
+        let ways = other_ways(&there, 2.0);
+        assert_eq!(ways.len(), 1, "{ways:?}");
+        let OtherWay { path, range: [from, to], promise_px } = &ways[0];
+        assert_eq!(*promise_px, TOUCH_PROMISE_PX);
+        // Up along x = 20 first, and back along y = 0 at last.
+        assert!((path[from + 15] - Point2::new(20.0, 15.0)).norm() < 2.5, "{:?}", path[from + 15]);
+        assert!((path[to - 10] - Point2::new(30.0, 0.0)).norm() < 2.5, "{:?}", path[to - 10]);
+        assert_eq!(path[..*from], there[..*from]);
+        assert_eq!(path[to + 1..], there[to + 1..]);
     }
 
     #[test]

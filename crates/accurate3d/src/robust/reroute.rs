@@ -10,7 +10,7 @@ use super::side_by_side::side_by_side;
 use super::start::{PRICES, start_from, through};
 
 /// Other ways of a candidate that are tried, and candidates whose ways are: without much effort ...
-const QUICKLY: [usize; 2] = [2, 1];
+const QUICKLY: [usize; 2] = [6, 1];
 /// ... and with it.
 const THOROUGHLY: [usize; 2] = [12, 3];
 /// Without much effort a curve is left whose score is so much behind the best or more.
