@@ -34,6 +34,8 @@ def _train(options: argparse.Namespace) -> None:
         for name in ("width", "steps", "seed", "learning_rate", "final_share", "final_batch")
         if getattr(options, name) is not None
     })
+    if options.float32:
+        config = replace(config, bfloat16=False)
     if options.dice is not None:
         config = replace(config, loss=replace(config.loss, dice=options.dice))
     trainer = Trainer(
@@ -145,6 +147,10 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--final-share", type=float, help="share of the steps at whole images")
     train.add_argument("--final-batch", type=int)
     train.add_argument("--dice", type=float, help="weight of a soft Dice term beside the paper's loss (0)")
+    train.add_argument(
+        "--float32", action="store_true",
+        help="no bfloat16: faster by far on a processor without instructions for it",
+    )
     train.add_argument("--until", type=int, help="stop at this step, with a checkpoint")
     train.add_argument("--threads", type=int, default=1)
     train.set_defaults(run_command=_train)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from accurate_training.__main__ import main
 from accurate_training.checkpoint import Checkpoint, CheckpointError
 from accurate_training.configuration import TrainConfig
 from accurate_training.curves import read_curve
@@ -122,3 +123,17 @@ def test_initial_weights_come_from_another_run(shards, tmp_path):
         Trainer(
             replace(CONFIG, width=3), shards=[shards], run=tmp_path / "third", init_from=tmp_path / "first" / CHECKPOINT
         )
+
+
+def test_float32_is_a_setting_of_the_run(shards: Path, tmp_path: Path):
+    run = tmp_path / "run"
+
+    def train(*more: str) -> int:
+        return main(["train", "--shards", str(shards), "--run", str(run), "--width", "2", "--final-share", "0", *more])
+
+    assert train("--steps", "1", "--float32") == 0
+    assert not Checkpoint.load(run / CHECKPOINT).config.bfloat16
+    # Going on in another precision is no resumption.
+    assert train("--steps", "2") == 2
+    assert train("--steps", "2", "--float32") == 0
+    assert Checkpoint.load(run / CHECKPOINT).step == 2

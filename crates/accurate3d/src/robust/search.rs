@@ -94,7 +94,7 @@ pub(crate) struct Search<'a> {
 pub(crate) enum Effort {
     /// What is right for most.
     Quick,
-    /// Every proposal, and every start of the best.
+    /// All proposals up to [`RobustParams::max_fits`], each from every start.
     Thorough,
 }
 
