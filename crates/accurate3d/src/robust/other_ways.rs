@@ -243,7 +243,7 @@ mod tests {
         assert_eq!(way.path[way.path.len() - 25..], there[there.len() - 25..]);
     }
 
-    /// Out, around and back to 1 px from where it came by.
+    /// Out, around and back to where it came by, without crossing.
     #[test]
     fn a_loop_whose_ends_touch_is_run_through_the_other_way_too() {
         let there = path(&[
@@ -251,7 +251,7 @@ mod tests {
             [40.0, 0.0],
             [40.0, 40.0],
             [20.0, 40.0],
-            [20.0, 1.0],
+            [20.0, 0.3],
             [-30.0, 40.0],
         ]);
         let ways = other_ways(&there, 2.0);
