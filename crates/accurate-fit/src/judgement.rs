@@ -40,11 +40,15 @@ impl Judgement {
         if used == 0 { 4.0 } else { self.chi / used as f64 }
     }
 
+    /// Boundary points of both views.
+    pub fn boundary_points(&self) -> usize {
+        self.points[0] + self.points[1]
+    }
+
     /// [`unexplained`](Self::unexplained) in parts of what a curve far from all of the outlines leaves: 0
     /// to 1.
     pub fn unexplained_share(&self) -> f64 {
-        let points = self.points[0] + self.points[1];
-        self.unexplained / (MOST_EXCESS_PX / 10.0 * points.max(1) as f64)
+        self.unexplained / (MOST_EXCESS_PX / 10.0 * self.boundary_points().max(1) as f64)
     }
 
     /// One number, smaller is better, to compare fits to the same outlines:

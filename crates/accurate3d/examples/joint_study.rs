@@ -23,6 +23,11 @@ use accurate3d::{InputKind, Method, Params, SecondLook, ViewPair, reconstruct};
 use ndarray::Array2;
 use rayon::prelude::*;
 
+/// Weights by which finalists are compared (`robust/score.rs`), the walks' cost and the forgiven cut faces
+/// aside.
+const SURPRISE_PER_SCORE: f64 = 12.0;
+const MISFIT: f64 = 2.0;
+
 struct Line {
     text: String,
     hausdorff_px: f64,
@@ -108,13 +113,13 @@ fn study(
         let sparse: Vec<_> = points.iter().step_by(5).copied().collect();
         Curve3::interpolate(&sparse).ok()
     };
-    // As finalists are compared, the walks' cost aside.
     let unlikeliness = |points: &[Point3]| {
         let start = fitted(points)?;
         let (settings, adaptive) = (OutlineFitParams::DEFAULT, AdaptiveParams::DEFAULT);
         let fit = fit_outlines_adaptively(&start, &outlines, &rig, &settings, &adaptive).ok()?;
         let judgement = fit.judgement;
-        Some((fit.surprise? / 12.0 + 2.0 * (judgement.unexplained + judgement.outside), judgement))
+        let misfit = judgement.unexplained + judgement.outside;
+        Some((fit.surprise? / SURPRISE_PER_SCORE + MISFIT * misfit, judgement))
     };
     let own = unlikeliness(&curve).map_or(f64::NAN, |(own, _)| own);
     let oracle = unlikeliness(&truth).map_or_else(

@@ -103,7 +103,7 @@ impl Evidence {
     ) -> Self {
         let judgement = &best.fit.judgement;
         Self {
-            boundary_points: judgement.points[0] + judgement.points[1],
+            boundary_points: judgement.boundary_points(),
             unexplained: best.misfit - judgement.outside,
             outside: judgement.outside,
             chi_per_point: judgement.chi_per_point(),

@@ -189,9 +189,9 @@ impl Candidate {
 
     /// Whether nothing speaks against it.
     pub(crate) fn is_good(&self, params: &RobustParams) -> bool {
-        let points = self.fit.judgement.points;
-        self.misfit < allowance(points[0] + points[1]) * params.good_unexplained
-            && self.fit.judgement.chi_per_point() < params.good_chi_per_point
+        let judgement = &self.fit.judgement;
+        self.misfit < allowance(judgement.boundary_points()) * params.good_unexplained
+            && judgement.chi_per_point() < params.good_chi_per_point
             && self.mean_distance_px < params.good_distance_px
     }
 }
