@@ -31,7 +31,10 @@ fn candidates<V: View>(project: impl Fn(Point3) -> Pixel<V>) -> Vec<Vec<Pixel<V>
 }
 
 fn curves<V: View>(points: &[Vec<Pixel<V>>]) -> Vec<SignalCurve<'_, V>> {
-    points.iter().map(|p| SignalCurve { points: p, cost: 0.0, free: FreeEnds::NONE }).collect()
+    points
+        .iter()
+        .map(|p| SignalCurve { points: p, cost: 0.0, free: FreeEnds::NONE, doubled_px: 0.0 })
+        .collect()
 }
 
 fn main() {

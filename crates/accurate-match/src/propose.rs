@@ -14,6 +14,8 @@ pub struct SignalCurve<'a, V: View> {
     pub cost: f64,
     /// Ends that may be wrong: a tip that lies on the body, an end at a crossing.
     pub free: FreeEnds,
+    /// Length that the candidate runs along itself, px.
+    pub doubled_px: f64,
 }
 
 /// One pair of candidates and a direction, with what speaks against it.
@@ -25,7 +27,8 @@ pub struct Proposal {
     pub j: usize,
     /// Whether candidate `j` runs against candidate `i`.
     pub reversed: bool,
-    /// Costs of both candidates, plus the end penalty, plus the weighted energy. Less is better.
+    /// Costs of both candidates, plus the penalties for ends and for a doubled body, plus the weighted
+    /// energy. Less is better.
     pub score: f64,
     /// [`interval_energy`](crate::interval_energy) at the fine step, px².
     pub energy_px2: f64,
@@ -50,6 +53,11 @@ pub struct ProposeParams {
     pub end_weight: f64,
     /// Each end counts at most this, px; a pair with both ends beyond it is dropped. 30.
     pub end_limit_px: f64,
+    /// Length doubled in both views that is not penalised, px. 25.
+    pub doubled_tolerance_px: f64,
+    /// Penalty per px doubled in both views beyond that: a body may lie on itself in one view, but in
+    /// both only where it does in space. 0.04.
+    pub doubled_weight: f64,
     /// Pairs that enter the coarse comparison, best costs and ends first. 2500.
     pub keep_screened: usize,
     /// Pairs that enter the fine comparison. 150.
@@ -68,6 +76,8 @@ impl ProposeParams {
         end_tolerance_px: 4.0,
         end_weight: 0.1,
         end_limit_px: 30.0,
+        doubled_tolerance_px: 25.0,
+        doubled_weight: 0.04,
         keep_screened: 2500,
         keep_coarse: 150,
         keep_fine: 100,
@@ -118,13 +128,16 @@ fn validate(params: &ProposeParams) -> Result<(), MatchError> {
     not_negative("energy_weight", params.energy_weight)?;
     not_negative("end_tolerance_px", params.end_tolerance_px)?;
     not_negative("end_weight", params.end_weight)?;
-    not_negative("end_limit_px", params.end_limit_px)
+    not_negative("end_limit_px", params.end_limit_px)?;
+    not_negative("doubled_tolerance_px", params.doubled_tolerance_px)?;
+    not_negative("doubled_weight", params.doubled_weight)
 }
 
 /// What is computed once per candidate.
 struct Candidate {
     cost: f64,
     free: FreeEnds,
+    doubled_px: f64,
     /// Angle and gradient of the first and the last point.
     ends: [(f64, f64); 2],
     coarse: AngleSignal,
@@ -138,10 +151,12 @@ fn candidates<V: View>(
 ) -> Result<Vec<Candidate>, MatchError> {
     let candidate = |curve: &SignalCurve<'_, V>| {
         not_negative("cost of a candidate", curve.cost)?;
+        not_negative("doubled_px", curve.doubled_px)?;
         let profile = profile(curve.points)?;
         Ok(Candidate {
             cost: curve.cost,
             free: curve.free.validate()?,
+            doubled_px: curve.doubled_px,
             ends: [profile.first(), profile.last()],
             coarse: profile.signal(params.coarse_step_px)?,
             fine: profile.signal(params.fine_step_px)?,
@@ -161,7 +176,7 @@ fn screen(
         for (j, c2) in candidates2.iter().enumerate() {
             for reversed in [false, true] {
                 if let Some(end_penalty) = end_penalty(c1, c2, reversed, params) {
-                    let score = c1.cost + c2.cost + end_penalty;
+                    let score = c1.cost + c2.cost + end_penalty + doubled_penalty(c1, c2, params);
                     pairs.push(Proposal { i, j, reversed, score, energy_px2: 0.0, end_penalty });
                 }
             }
@@ -199,6 +214,11 @@ fn end_penalty(
     (beyond < 2).then(|| params.end_weight * (sum - params.end_tolerance_px).max(0.0))
 }
 
+fn doubled_penalty(c1: &Candidate, c2: &Candidate, params: &ProposeParams) -> f64 {
+    let in_both_px = c1.doubled_px.min(c2.doubled_px);
+    params.doubled_weight * (in_both_px - params.doubled_tolerance_px).max(0.0)
+}
+
 /// Pairs compared side by side.
 const LANES: usize = 8;
 /// Pairs between two looks at the score to beat, a multiple of `LANES`.
@@ -215,7 +235,10 @@ fn sieve(
 ) -> Vec<Proposal> {
     let mut dp = IntervalDp::<LANES>::new(params.prices);
     let mut kept: Vec<Proposal> = Vec::with_capacity(keep.min(pairs.len()) + CHUNK);
-    let base = |p: &Proposal| candidates1[p.i].cost + candidates2[p.j].cost + p.end_penalty;
+    let base = |p: &Proposal| {
+        let (c1, c2) = (&candidates1[p.i], &candidates2[p.j]);
+        c1.cost + c2.cost + p.end_penalty + doubled_penalty(c1, c2, params)
+    };
     let lane = |p: &Proposal| {
         let (c1, c2) = (&candidates1[p.i], &candidates2[p.j]);
         Lane::new(signal(c1), c1.free, signal(c2), c2.free, p.reversed)

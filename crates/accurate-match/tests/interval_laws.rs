@@ -212,14 +212,14 @@ proptest! {
     #[test]
     fn the_ranking_is_what_comparing_every_pair_gives(
         rig in rigs(),
-        curves1 in prop::collection::vec((curves::<View1>(20..=60), 0.0..1.0_f64, free_ends()), 1..=5),
-        curves2 in prop::collection::vec((curves::<View2>(20..=60), 0.0..1.0_f64, free_ends()), 1..=5),
+        curves1 in prop::collection::vec((curves::<View1>(20..=60), 0.0..1.0_f64, free_ends(), 0.0..60.0_f64), 1..=5),
+        curves2 in prop::collection::vec((curves::<View2>(20..=60), 0.0..1.0_f64, free_ends(), 0.0..60.0_f64), 1..=5),
         keep_screened in 1..30_usize, keep_coarse in 1..30_usize, keep_fine in 1..20_usize,
         end_limit_px in 20.0..400.0_f64,
     ) {
         let angles = EpipolarAngle::new(&rig);
-        fn signal_curve<V: View>((points, cost, free): &(Vec<Pixel<V>>, f64, FreeEnds)) -> SignalCurve<'_, V> {
-            SignalCurve { points, cost: *cost, free: *free }
+        fn signal_curve<V: View>((points, cost, free, doubled_px): &(Vec<Pixel<V>>, f64, FreeEnds, f64)) -> SignalCurve<'_, V> {
+            SignalCurve { points, cost: *cost, free: *free, doubled_px: *doubled_px }
         }
         let (c1, c2): (Vec<_>, Vec<_>) = (curves1.iter().map(signal_curve).collect(), curves2.iter().map(signal_curve).collect());
         let params = ProposeParams {
@@ -255,8 +255,13 @@ proptest! {
             pairs.sort_by(|a, b| a.score.total_cmp(&b.score).then((a.i, a.j, a.reversed).cmp(&(b.i, b.j, b.reversed))));
             pairs.truncate(keep);
         };
+        let base = |p: &Proposal| {
+            let (c1, c2) = (&c1[p.i], &c2[p.j]);
+            let doubled = 0.04 * (c1.doubled_px.min(c2.doubled_px) - 25.0).max(0.0);
+            c1.cost + c2.cost + p.end_penalty + doubled
+        };
         for p in &mut pairs {
-            p.score = c1[p.i].cost + c2[p.j].cost + p.end_penalty;
+            p.score = base(p);
         }
         best(&mut pairs, keep_screened);
         for (step, keep) in [(params.coarse_step_px, keep_coarse), (params.fine_step_px, keep_fine)] {
@@ -264,7 +269,7 @@ proptest! {
                 let s1 = AngleProfile::of_view1(&angles, c1[p.i].points, params.fine_step_px).unwrap().signal(step).unwrap();
                 let s2 = AngleProfile::of_view2(&angles, c2[p.j].points, params.fine_step_px).unwrap().signal(step).unwrap();
                 p.energy_px2 = interval_energy(&s1, c1[p.i].free, &s2, c2[p.j].free, p.reversed, &params.prices).unwrap();
-                p.score = c1[p.i].cost + c2[p.j].cost + p.end_penalty + params.energy_weight * p.energy_px2;
+                p.score = base(p) + params.energy_weight * p.energy_px2;
             }
             best(&mut pairs, keep);
         }
@@ -308,7 +313,7 @@ fn no_candidates_give_no_proposals() {
 fn unusable_input_is_refused_by_name() {
     let angles = EpipolarAngle::new(&scenes::rig(1.0, 20.0, 1500.0, 1500.0));
     let point = [Pixel::<View1>::new(10.0, 20.0)];
-    let curve = |points, cost| SignalCurve { points, cost, free: FreeEnds::NONE };
+    let curve = |points, cost| SignalCurve { points, cost, free: FreeEnds::NONE, doubled_px: 0.0 };
     let propose = |c: SignalCurve<'_, View1>, params: &ProposeParams| {
         propose_pairs(&angles, &[c], &[], params).unwrap_err()
     };
@@ -324,10 +329,16 @@ fn unusable_input_is_refused_by_name() {
         SignalCurve { free: FreeEnds { begin_px: -1.0, end_px: 0.0 }, ..curve(&point, 0.0) },
         &default
     )));
+    assert!(out_of_range(propose(
+        SignalCurve { doubled_px: f64::NAN, ..curve(&point, 0.0) },
+        &default
+    )));
     for params in [
         ProposeParams { fine_step_px: 0.0, ..default },
         ProposeParams { coarse_step_px: f64::INFINITY, ..default },
         ProposeParams { end_weight: -1.0, ..default },
+        ProposeParams { doubled_weight: f64::NAN, ..default },
+        ProposeParams { doubled_tolerance_px: -1.0, ..default },
         ProposeParams {
             prices: IntervalPrices { cap_px: f64::NAN, ..IntervalPrices::DEFAULT },
             ..default

@@ -120,18 +120,52 @@ impl<V: View> ViewCandidates<V> {
     ) -> Result<(), Error> {
         let rewards: Vec<_> =
             rewards.iter().map(|&([x, y], w)| (self.frame.in_part(Pixel::new(x, y)), w)).collect();
-        let mut walks = k_best_walks_with_reward(&self.graph, params, &rewards)
+        self.add(params, &rewards, 0.0, case)
+    }
+
+    /// Adds the walks that are best where turning round at a tip is dear.
+    pub(crate) fn walk_without_turning(
+        &mut self,
+        params: &WalkParams,
+        case: &str,
+    ) -> Result<(), Error> {
+        const DEARER: f64 = 2.0;
+        let params = WalkParams { u_turn: params.u_turn + DEARER, ..*params };
+        self.add(&params, &[], DEARER, case)
+    }
+
+    /// Adds the walks that are not there yet, each at what it is worth without a reward and where a turn
+    /// is not `dearer_turn` dearer.
+    fn add(
+        &mut self,
+        params: &WalkParams,
+        rewards: &[(Pixel<V>, f64)],
+        dearer_turn: f64,
+        case: &str,
+    ) -> Result<(), Error> {
+        let mut walks = k_best_walks_with_reward(&self.graph, params, rewards)
             .map_err(|source| Error::Traversal { case: case.to_owned(), source })?;
         walks.retain(|walk| self.walks.iter().all(|known| known.halves != walk.halves));
         for walk in &mut walks {
-            // What a walk is worth without the reward.
             walk.cost.missed_reward = 0.0;
+            walk.cost.u_turns -= dearer_turn * self.turns_at_tips(walk) as f64;
             for point in &mut walk.points {
                 *point = self.frame.in_image(*point);
             }
         }
         self.walks.append(&mut walks);
         Ok(())
+    }
+
+    fn turns_at_tips(&self, walk: &Walk<V>) -> usize {
+        let turns = |pair: &[HalfEdge]| {
+            let [half, next] = [pair[0], pair[1]];
+            let node = self.graph.edges()[half.edge].ends[usize::from(!half.reversed)];
+            half.edge == next.edge
+                && half.reversed != next.reversed
+                && self.graph.nodes()[node].kind == NodeKind::Tip
+        };
+        walk.halves.windows(2).filter(|pair| turns(pair)).count()
     }
 
     /// Where a walk takes bridges, and where the map leads over gaps: both ends of each.
@@ -193,6 +227,7 @@ impl<V: View> ViewCandidates<V> {
                 points: &walk.points,
                 cost: walk.cost.total(),
                 free: free_ends(walk),
+                doubled_px: doubled_px(walk),
             })
             .collect()
     }
@@ -296,7 +331,7 @@ fn median_width(thin: &Mask, radii: &Array2<f64>) -> f64 {
 /// a walk that ends at a junction may be off by its node.
 pub(crate) fn free_ends<V: View>(walk: &Walk<V>) -> FreeEnds {
     const JUNCTION_PX: f64 = 4.0;
-    let spacing = || walk.length_px() / (walk.points.len().max(2) - 1) as f64;
+    let spacing = || spacing_px(walk);
     let free = |end: WalkEnd, flags: &mut dyn Iterator<Item = &PointFlags>| match end {
         WalkEnd::Tip | WalkEnd::Closed => 0.0,
         WalkEnd::Junction => JUNCTION_PX,
@@ -304,6 +339,15 @@ pub(crate) fn free_ends<V: View>(walk: &Walk<V>) -> FreeEnds {
     };
     let begin_px = free(walk.ends[0], &mut walk.flags.iter());
     FreeEnds { begin_px, end_px: free(walk.ends[1], &mut walk.flags.iter().rev()) }
+}
+
+/// The length that a walk passes twice, px.
+fn doubled_px<V: View>(walk: &Walk<V>) -> f64 {
+    0.5 * walk.flags.iter().filter(|flag| flag.reused).count() as f64 * spacing_px(walk)
+}
+
+fn spacing_px<V: View>(walk: &Walk<V>) -> f64 {
+    walk.length_px() / (walk.points.len().max(2) - 1) as f64
 }
 
 #[cfg(test)]
@@ -348,5 +392,35 @@ mod tests {
             walk.points.iter().any(|p| p.distance(top) < 2.0) && ends.iter().all(|p| p.y > 95.0)
         };
         assert!(view.walks.iter().any(passes), "{}", view.walks.len());
+    }
+
+    /// A ring on a stem: whatever the price of a turn while walks are sought, the same walk costs the
+    /// same, those that turn at the stem's tip among them.
+    #[test]
+    fn a_walk_is_worth_the_same_however_it_was_found() {
+        let on_ring = |x: f64, y: f64| (x.hypot(y) - 30.0).abs() <= 1.5;
+        let on_stem = |x: f64, y: f64| x.abs() <= 1.5 && (28.0..=90.0).contains(&y);
+        let mask = Array2::from_shape_fn((180, 120), |(row, column)| {
+            let (x, y) = (column as f64 - 60.0, row as f64 - 60.0);
+            on_ring(x, y) || on_stem(x, y)
+        });
+        let view = |params: &WalkParams| {
+            ViewCandidates::<View1>::of(&mask, None, params, Turn::NONE, "ring").unwrap()
+        };
+        let usual = view(&WalkParams::DEFAULT);
+        let mut found = view(&WalkParams { walks: 1, ..WalkParams::DEFAULT });
+        found.walk_without_turning(&WalkParams::DEFAULT, "ring").unwrap();
+        let mut turned = 0;
+        for walk in &usual.walks {
+            let Some(again) = found.walks.iter().find(|w| w.halves == walk.halves) else {
+                continue;
+            };
+            let (once, twice) = (walk.cost.total(), again.cost.total());
+            assert!((once - twice).abs() < 1e-12, "{once} {twice} {:?}", walk.halves);
+            turned += found.turns_at_tips(again);
+        }
+        assert!(turned > 0);
+        // And what does not turn comes first.
+        assert_eq!(found.turns_at_tips(&found.walks[1]), 0);
     }
 }

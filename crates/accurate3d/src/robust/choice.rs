@@ -4,7 +4,7 @@ use accurate_geom::{Rig, View1, View2};
 use super::candidates::ViewCandidates;
 use super::evidence::{Evidence, Walks};
 use super::score::Candidate;
-use super::search::{Search, Tried};
+use super::search::{Effort, Search, Tried};
 use super::side_by_side::side_by_side;
 use crate::Error;
 
@@ -45,6 +45,23 @@ impl Settled {
         calibrations.swap(0, first);
         let evidence = evidence(&fits, &choice.finalists, given_rig, view1, view2);
         Self { fits, calibrations, evidence, choice }
+    }
+
+    /// Takes in the likeliest curve of a search with less effort, which may be lost among more: finalists are
+    /// the best by score.
+    pub(crate) fn recall(
+        &mut self,
+        (known, calibration): (Candidate, Option<CalibrationEstimate>),
+        given_rig: &Rig,
+        view1: &ViewCandidates<View1>,
+        view2: &ViewCandidates<View2>,
+    ) {
+        let at = self.fits.len();
+        let is_likeliest = known.unlikeliness() < self.fits[0].unlikeliness();
+        self.choice.finalists.insert(at, known.clone());
+        self.fits.push(known);
+        self.calibrations.push(calibration);
+        self.prefer(if is_likeliest { at } else { 0 }, given_rig, view1, view2);
     }
 
     /// Whether most of what the views show is not this body: no other walk through it explains it.
@@ -135,6 +152,11 @@ pub(crate) fn choose(
         // All with the same freedom, or the freest would win.
         found = side_by_side(&earlier.finalists, |finalist| search.usual(finalist.clone()));
         (tried, fits) = (earlier.tried, earlier.fits);
+    }
+    if search.effort == Effort::Thorough {
+        // Else all walks may be one that turns round at a tip and comes back along itself, varied elsewhere.
+        view1.walk_without_turning(&params.walks, search.case)?;
+        view2.walk_without_turning(&params.walks, search.case)?;
     }
     let before = found.len();
     let pairs =

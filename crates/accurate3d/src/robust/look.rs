@@ -64,7 +64,9 @@ impl Look<'_> {
         let again = closure == Closure::Open && params.second_look.is_due(in_doubt);
         if again {
             search.effort = Effort::Thorough;
+            let known = (settled.fits.swap_remove(0), settled.calibrations.swap_remove(0));
             settled = settle(&search, Some(settled.choice))?;
+            settled.recall(known, rig, &view1, &view2);
         }
         let fits = settled.choice.fits;
         Ok(Seen { view1, view2, settled, others: Vec::new(), fits })
