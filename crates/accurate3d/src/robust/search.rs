@@ -120,6 +120,7 @@ impl Search<'_> {
                 keep_screened: params.keep_screened.min(QUICK_KEPT[0]),
                 keep_coarse: params.keep_coarse.min(QUICK_KEPT[1]),
                 keep_fine: params.keep_fine.min(QUICK_KEPT[2]),
+                doubled_weight: 0.0,
                 ..*params
             },
             Effort::Thorough => *params,
