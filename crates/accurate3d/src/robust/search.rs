@@ -120,6 +120,7 @@ impl Search<'_> {
                 keep_screened: params.keep_screened.min(QUICK_KEPT[0]),
                 keep_coarse: params.keep_coarse.min(QUICK_KEPT[1]),
                 keep_fine: params.keep_fine.min(QUICK_KEPT[2]),
+                // What is tried first is taken if it looks good.
                 doubled_weight: 0.0,
                 ..*params
             },
