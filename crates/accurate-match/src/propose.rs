@@ -58,7 +58,7 @@ pub struct ProposeParams {
     /// Penalty per px doubled in both views beyond that: a body may lie on itself in one view, but in
     /// both only where it does in space. 0.04.
     pub doubled_weight: f64,
-    /// Pairs that enter the coarse comparison, best costs and ends first. 2500.
+    /// Pairs that enter the coarse comparison, best first by all but their angles. 2500.
     pub keep_screened: usize,
     /// Pairs that enter the fine comparison. 150.
     pub keep_coarse: usize,
@@ -93,7 +93,7 @@ impl Default for ProposeParams {
 /// Ranks all pairs of candidates and both directions by how well their epipolar angles agree, best
 /// first; equal scores in order of `(i, j, reversed)`.
 ///
-/// Three sieves: costs and ends; interval alignment at the coarse step; at the fine step. A pair is
+/// Three sieves: costs, ends and doubled lengths; interval alignment at the coarse step; at the fine step. A pair is
 /// given up as soon as it cannot pass, which changes no result. The list is empty if there are no
 /// candidates or if no pair has an end in common.
 ///
@@ -165,7 +165,7 @@ fn candidates<V: View>(
     curves.iter().map(candidate).collect()
 }
 
-/// Pairs by costs and ends alone, best first.
+/// Pairs by all but their angles, best first.
 fn screen(
     candidates1: &[Candidate],
     candidates2: &[Candidate],
@@ -176,7 +176,7 @@ fn screen(
         for (j, c2) in candidates2.iter().enumerate() {
             for reversed in [false, true] {
                 if let Some(end_penalty) = end_penalty(c1, c2, reversed, params) {
-                    let score = c1.cost + c2.cost + end_penalty + doubled_penalty(c1, c2, params);
+                    let score = unaligned_score(c1, c2, end_penalty, params);
                     pairs.push(Proposal { i, j, reversed, score, energy_px2: 0.0, end_penalty });
                 }
             }
@@ -214,9 +214,15 @@ fn end_penalty(
     (beyond < 2).then(|| params.end_weight * (sum - params.end_tolerance_px).max(0.0))
 }
 
-fn doubled_penalty(c1: &Candidate, c2: &Candidate, params: &ProposeParams) -> f64 {
-    let in_both_px = c1.doubled_px.min(c2.doubled_px);
-    params.doubled_weight * (in_both_px - params.doubled_tolerance_px).max(0.0)
+/// What speaks against a pair before its angles are compared.
+fn unaligned_score(
+    c1: &Candidate,
+    c2: &Candidate,
+    end_penalty: f64,
+    params: &ProposeParams,
+) -> f64 {
+    let doubled_px = (c1.doubled_px.min(c2.doubled_px) - params.doubled_tolerance_px).max(0.0);
+    c1.cost + c2.cost + end_penalty + params.doubled_weight * doubled_px
 }
 
 /// Pairs compared side by side.
@@ -235,10 +241,8 @@ fn sieve(
 ) -> Vec<Proposal> {
     let mut dp = IntervalDp::<LANES>::new(params.prices);
     let mut kept: Vec<Proposal> = Vec::with_capacity(keep.min(pairs.len()) + CHUNK);
-    let base = |p: &Proposal| {
-        let (c1, c2) = (&candidates1[p.i], &candidates2[p.j]);
-        c1.cost + c2.cost + p.end_penalty + doubled_penalty(c1, c2, params)
-    };
+    let base =
+        |p: &Proposal| unaligned_score(&candidates1[p.i], &candidates2[p.j], p.end_penalty, params);
     let lane = |p: &Proposal| {
         let (c1, c2) = (&candidates1[p.i], &candidates2[p.j]);
         Lane::new(signal(c1), c1.free, signal(c2), c2.free, p.reversed)

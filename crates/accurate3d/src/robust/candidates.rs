@@ -120,40 +120,34 @@ impl<V: View> ViewCandidates<V> {
     ) -> Result<(), Error> {
         let rewards: Vec<_> =
             rewards.iter().map(|&([x, y], w)| (self.frame.in_part(Pixel::new(x, y)), w)).collect();
-        self.add(params, &rewards, 0.0, case)
+        let mut walks = k_best_walks_with_reward(&self.graph, params, &rewards)
+            .map_err(|source| Error::Traversal { case: case.to_owned(), source })?;
+        walks.retain(|walk| self.walks.iter().all(|known| known.halves != walk.halves));
+        for walk in &mut walks {
+            // What a walk is worth without the reward.
+            walk.cost.missed_reward = 0.0;
+            for point in &mut walk.points {
+                *point = self.frame.in_image(*point);
+            }
+        }
+        self.walks.append(&mut walks);
+        Ok(())
     }
 
-    /// Adds the walks that are best where turning round at a tip is dear.
+    /// Adds the walks that are best where turning round at a tip is dear, at what they are worth where it
+    /// is not.
     pub(crate) fn walk_without_turning(
         &mut self,
         params: &WalkParams,
         case: &str,
     ) -> Result<(), Error> {
         const DEARER: f64 = 2.0;
-        let params = WalkParams { u_turn: params.u_turn + DEARER, ..*params };
-        self.add(&params, &[], DEARER, case)
-    }
-
-    /// Adds the walks that are not there yet, each at what it is worth without a reward and where a turn
-    /// is not `dearer_turn` dearer.
-    fn add(
-        &mut self,
-        params: &WalkParams,
-        rewards: &[(Pixel<V>, f64)],
-        dearer_turn: f64,
-        case: &str,
-    ) -> Result<(), Error> {
-        let mut walks = k_best_walks_with_reward(&self.graph, params, rewards)
-            .map_err(|source| Error::Traversal { case: case.to_owned(), source })?;
-        walks.retain(|walk| self.walks.iter().all(|known| known.halves != walk.halves));
-        for walk in &mut walks {
-            walk.cost.missed_reward = 0.0;
-            walk.cost.u_turns -= dearer_turn * self.turns_at_tips(walk) as f64;
-            for point in &mut walk.points {
-                *point = self.frame.in_image(*point);
-            }
+        let known = self.walks.len();
+        self.walk(&WalkParams { u_turn: params.u_turn + DEARER, ..*params }, &[], case)?;
+        for k in known..self.walks.len() {
+            let turns = self.turns_at_tips(&self.walks[k]);
+            self.walks[k].cost.u_turns -= DEARER * turns as f64;
         }
-        self.walks.append(&mut walks);
         Ok(())
     }
 
@@ -331,11 +325,10 @@ fn median_width(thin: &Mask, radii: &Array2<f64>) -> f64 {
 /// a walk that ends at a junction may be off by its node.
 pub(crate) fn free_ends<V: View>(walk: &Walk<V>) -> FreeEnds {
     const JUNCTION_PX: f64 = 4.0;
-    let spacing = || spacing_px(walk);
     let free = |end: WalkEnd, flags: &mut dyn Iterator<Item = &PointFlags>| match end {
         WalkEnd::Tip | WalkEnd::Closed => 0.0,
         WalkEnd::Junction => JUNCTION_PX,
-        WalkEnd::OnReusedEdge => flags.take_while(|f| f.reused).count() as f64 * spacing(),
+        WalkEnd::OnReusedEdge => flags.take_while(|f| f.reused).count() as f64 * spacing_px(walk),
     };
     let begin_px = free(walk.ends[0], &mut walk.flags.iter());
     FreeEnds { begin_px, end_px: free(walk.ends[1], &mut walk.flags.iter().rev()) }
