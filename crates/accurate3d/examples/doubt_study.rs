@@ -1,38 +1,47 @@
 //! What tells wrong reconstructions from right ones, before the truth is known.
 //!
-//! `doubt_study run SCENE SEED CASES >> FILE` reconstructs generated masks and writes one line of
-//! comma-separated evidence a case (`accurate3d::Evidence::terms`), with the true Hausdorff
-//! distance in px and the seconds taken in front. Scenes: `easy`, `medium`, `hard`, `carm`,
-//! `sim-paper`, `helix`; `medium-discs`; `medium-turned` by 0.05 degrees and `carm-off` by 0.03 degrees
-//! and 0.3 px, both with the calibration estimated.
+//! `doubt_study run SCENE SEED CASES >> FILE` reconstructs generated masks and writes one line of JSON a
+//! case: the evidence, the true Hausdorff distance in px and the seconds taken. Scenes: `easy`, `medium`,
+//! `hard`, `carm`, `sim-paper`, `helix`; `medium-discs`; `medium-turned` by 0.05 degrees and `carm-off` by
+//! 0.03 degrees and 0.3 px, both with the calibration estimated.
 //!
-//! `doubt_study fit FILE...` fits a logistic rule (ridge, all terms standardised) to such lines and
-//! prints its terms, and what share of the wrong (beyond 5 px) it flags at which cost, in the sample
-//! and with every tenth case left out in turn.
+//! `doubt_study limits FILE...` tries limits of doubt on such lines: for every number of wrong ones (beyond
+//! 5 px) that any limits flag, those that flag the fewest right ones.
 #![allow(clippy::print_stdout)]
 
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::str::FromStr;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use accurate3d::eval::curve_scores;
 use accurate3d::fit::CalibrationPriors;
-use accurate3d::geom::nalgebra::{DMatrix, DVector};
 use accurate3d::geom::{Camera, Point3, Rig};
 use accurate3d::synth::{CalibrationError, CaseOptions, Family, generate};
-use accurate3d::{Evidence, InputKind, Method, Params, ViewPair, reconstruct};
+use accurate3d::{DoubtLimits, Evidence, InputKind, Method, Params, ViewPair, reconstruct};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 type Failure = Box<dyn Error + Send + Sync>;
 
 const WRONG_PX: f64 = 5.0;
 
+#[derive(Serialize, Deserialize)]
+struct Line {
+    scene: String,
+    seed: u64,
+    index: u64,
+    hausdorff_px: f64,
+    seconds: f64,
+    evidence: Evidence,
+}
+
 fn main() -> Result<(), Failure> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     match args.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["run", scene, seed, cases] => run(scene, seed.parse()?, cases.parse()?),
-        ["fit", ref files @ ..] if !files.is_empty() => fit(files),
-        _ => Err("run SCENE SEED CASES, or fit FILE...".into()),
+        ["limits", ref files @ ..] if !files.is_empty() => limits(files),
+        _ => Err("run SCENE SEED CASES, or limits FILE...".into()),
     }
 }
 
@@ -62,13 +71,15 @@ fn run(scene: &str, seed: u64, cases: u64) -> Result<(), Failure> {
             let unit_per_px = unit_per_px(&rig, &truth);
             let scores = curve_scores(&found.positions(), &truth, 0.5 * unit_per_px)?;
             let outline = found.diagnostics.outline.ok_or("no outline diagnostics")?;
-            let terms: Vec<String> =
-                outline.evidence.terms().iter().map(|v| format!("{v:.6}")).collect();
-            Ok(format!(
-                "{scene},{seed},{index},{:.3},{seconds:.3},{}",
-                scores.hausdorff / unit_per_px,
-                terms.join(",")
-            ))
+            let line = Line {
+                scene: scene.to_owned(),
+                seed,
+                index,
+                hausdorff_px: scores.hausdorff / unit_per_px,
+                seconds,
+                evidence: outline.evidence,
+            };
+            Ok(serde_json::to_string(&line)?)
         })
         .collect::<Result<_, Failure>>()?;
     lines.iter().for_each(|line| println!("{line}"));
@@ -94,99 +105,54 @@ fn unit_per_px(rig: &Rig, truth: &[Point3]) -> f64 {
     (depth(rig.camera1()) + depth(rig.camera2())) / 2.0
 }
 
-struct Line {
-    wrong: bool,
-    terms: Vec<f64>,
-}
-
-fn fit(files: &[&str]) -> Result<(), Failure> {
-    let mut lines = Vec::new();
+fn limits(files: &[&str]) -> Result<(), Failure> {
+    let mut lines: Vec<Line> = Vec::new();
     for file in files {
         for text in std::fs::read_to_string(file)?.lines() {
-            let fields: Vec<&str> = text.split(',').collect();
-            let number = |k: usize| -> Result<f64, Failure> { Ok(fields[k].parse()?) };
-            let evidence = (5..fields.len()).map(number).collect::<Result<Vec<f64>, Failure>>()?;
-            lines.push(Line { wrong: number(3)? > WRONG_PX, terms: evidence });
+            lines.push(serde_json::from_str(text)?);
         }
     }
-    let wrong = lines.iter().filter(|line| line.wrong).count();
+    let count = |limits: &DoubtLimits, wrong: bool| {
+        let these = lines.iter().filter(|line| (line.hausdorff_px > WRONG_PX) == wrong);
+        these.filter(|line| !line.evidence.suspicions(limits).is_empty()).count()
+    };
+    let wrong = lines.iter().filter(|line| line.hausdorff_px > WRONG_PX).count();
     println!("{} cases, {wrong} wrong", lines.len());
-    let all: Vec<&Line> = lines.iter().collect();
-    let rule = logistic(&all);
-    println!("constant {:.3}", rule[0]);
-    for (name, weight) in Evidence::TERMS.iter().zip(&rule[1..]) {
-        println!("{name:22} {weight:8.3}");
-    }
-    const FOLDS: usize = 10;
-    let mut left_out = vec![0.0; lines.len()];
-    for fold in 0..FOLDS {
-        let rest: Vec<&Line> =
-            lines.iter().enumerate().filter(|(k, _)| k % FOLDS != fold).map(|(_, l)| l).collect();
-        let rule = logistic(&rest);
-        for k in (fold..lines.len()).step_by(FOLDS) {
-            left_out[k] = score(&rule, &lines[k].terms);
+    println!("wrong flagged, right flagged, limits");
+    let mut best: BTreeMap<usize, (usize, DoubtLimits)> = BTreeMap::new();
+    for limits in grid() {
+        let (flagged, alarms) = (count(&limits, true), count(&limits, false));
+        let known = best.entry(flagged).or_insert((alarms, limits));
+        if alarms < known.0 {
+            *known = (alarms, limits);
         }
     }
-    let inside: Vec<f64> = lines.iter().map(|l| score(&rule, &l.terms)).collect();
-    for (name, scores) in [("in the sample", &inside), ("left out", &left_out)] {
-        println!(
-            "{name}: score above, wrong flagged of {wrong}, right flagged of {}",
-            lines.len() - wrong
-        );
-        let mut cuts: Vec<f64> =
-            scores.iter().zip(&lines).filter(|(_, l)| l.wrong).map(|(s, _)| *s).collect();
-        cuts.sort_by(f64::total_cmp);
-        for cut in cuts.iter().take(12) {
-            let flagged = |wrong: bool| {
-                scores.iter().zip(&lines).filter(|(s, l)| l.wrong == wrong && *s >= cut).count()
-            };
-            println!("{cut:8.3} {:4} {:4}", flagged(true), flagged(false));
-        }
+    for (flagged, (alarms, limits)) in best {
+        println!("{flagged:4} {alarms:4} {limits:?}");
+    }
+    for limits in [DoubtLimits::MASKS, DoubtLimits::MAPS] {
+        println!("{:4} {:4} {limits:?} (as it is)", count(&limits, true), count(&limits, false));
     }
     Ok(())
 }
 
-fn score(rule: &[f64], terms: &[f64]) -> f64 {
-    rule[0] + rule[1..].iter().zip(terms).map(|(w, x)| w * x).sum::<f64>()
-}
-
-/// Constant and weights of the ridge-penalised logistic regression, by Newton's method.
-fn logistic(lines: &[&Line]) -> Vec<f64> {
-    const RIDGE: f64 = 1.0;
-    let (n, p) = (lines.len(), Evidence::TERMS.len());
-    let column = |k: usize| lines.iter().map(move |l| l.terms[k]);
-    let means: Vec<f64> = (0..p).map(|k| column(k).sum::<f64>() / n as f64).collect();
-    let scales: Vec<f64> = (0..p)
-        .map(|k| {
-            let variance = column(k).map(|x| (x - means[k]).powi(2)).sum::<f64>() / n as f64;
-            variance.sqrt().max(1e-9)
+fn grid() -> impl Iterator<Item = DoubtLimits> {
+    let unexplained = [0.03, 0.04, 0.06, 0.08, 0.12, 0.2];
+    let each = unexplained.into_iter().flat_map(|unexplained| {
+        [0.5, 0.7, 1.0].map(|unexplained_at_bridges| DoubtLimits {
+            unexplained,
+            unexplained_at_bridges,
+            ..DoubtLimits::MASKS
         })
-        .collect();
-    let x = DMatrix::from_fn(n, p + 1, |i, k| match k.checked_sub(1) {
-        None => 1.0,
-        Some(k) => (lines[i].terms[k] - means[k]) / scales[k],
     });
-    let mut beta = DVector::zeros(p + 1);
-    for _ in 0..30 {
-        let probability = (&x * &beta).map(|z: f64| 1.0 / (1.0 + (-z).exp()));
-        let missing = DVector::from_fn(n, |i, _| f64::from(lines[i].wrong) - probability[i]);
-        let mut gradient = x.transpose() * missing;
-        let weighted =
-            DMatrix::from_fn(n, p + 1, |i, k| x[(i, k)] * probability[i] * (1.0 - probability[i]));
-        let mut hessian = x.transpose() * weighted;
-        for k in 1..=p {
-            gradient[k] -= RIDGE * beta[k];
-            hessian[(k, k)] += RIDGE;
-        }
-        match hessian.cholesky() {
-            Some(factor) => beta += factor.solve(&gradient),
-            None => break,
-        }
-    }
-    let mut rule: Vec<f64> = beta.iter().copied().collect();
-    for k in 0..p {
-        rule[k + 1] /= scales[k];
-        rule[0] -= rule[k + 1] * means[k];
-    }
-    rule
+    let each = each.flat_map(|limits| {
+        [0.066, 0.068, 0.072, 0.08]
+            .map(|chi_per_point_px2| DoubtLimits { chi_per_point_px2, ..limits })
+    });
+    let each = each.flat_map(|limits| {
+        [1.0, 1.5, 2.0, 2.5, 3.0, 4.0].map(|margin| DoubtLimits { margin, ..limits })
+    });
+    each.flat_map(|limits| {
+        [1.1, 1.2, 1.3, 1.5, 1.7, 1.9].map(|sigma_px| DoubtLimits { sigma_px, ..limits })
+    })
 }

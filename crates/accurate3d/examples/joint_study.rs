@@ -5,7 +5,8 @@
 //! distance) and what the truth says (Hausdorff in px, Overall and Max of the table in world units).
 //! `L` is how unlikely the curve is, as finalists are compared, `oracle` the same of the fit that starts
 //! from the truth: a right curve that is likelier was not found by the search, one that is less likely was
-//! passed over for what was taken.
+//! passed over for what was taken. What that fit is off itself no search can mend: the outlines do not show
+//! it. It is summed up last, under the given cameras.
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;
@@ -28,6 +29,16 @@ use rayon::prelude::*;
 const SURPRISE_PER_SCORE: f64 = 12.0;
 const MISFIT: f64 = 2.0;
 
+/// For curves that bend more than the usual knots allow, from a start that is right.
+const FINE: OutlineFitParams = OutlineFitParams {
+    cauchy_scale_start_px: OutlineFitParams::DEFAULT.cauchy_scale_px,
+    subsample: false,
+    knot_spacing_px: 4.0,
+    lambda3: 0.03,
+    lambda3_start: 0.03,
+    ..OutlineFitParams::DEFAULT
+};
+
 struct Line {
     text: String,
     hausdorff_px: f64,
@@ -35,6 +46,8 @@ struct Line {
     table: [f64; 2],
     seconds: f64,
     suspect: bool,
+    /// Hausdorff distance, px and world units, and Overall of the table of the fit from the truth.
+    from_truth: Option<[f64; 3]>,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -115,20 +128,33 @@ fn study(
     };
     let unlikeliness = |points: &[Point3]| {
         let start = fitted(points)?;
-        let (settings, adaptive) = (OutlineFitParams::DEFAULT, AdaptiveParams::DEFAULT);
-        let fit = fit_outlines_adaptively(&start, &outlines, &rig, &settings, &adaptive).ok()?;
-        let judgement = fit.judgement;
-        let misfit = judgement.unexplained + judgement.outside;
-        Some((fit.surprise? / SURPRISE_PER_SCORE + MISFIT * misfit, judgement))
+        let likeliness = |settings: &OutlineFitParams| {
+            let adaptive = AdaptiveParams::DEFAULT;
+            let fit = fit_outlines_adaptively(&start, &outlines, &rig, settings, &adaptive).ok()?;
+            let judgement = fit.judgement;
+            let misfit = judgement.unexplained + judgement.outside;
+            Some((fit.surprise? / SURPRISE_PER_SCORE + MISFIT * misfit, judgement, fit.curve))
+        };
+        let fits = [OutlineFitParams::DEFAULT, FINE].iter().filter_map(likeliness);
+        fits.min_by(|a, b| a.0.total_cmp(&b.0))
     };
-    let own = unlikeliness(&curve).map_or(f64::NAN, |(own, _)| own);
-    let oracle = unlikeliness(&truth).map_or_else(
+    let own = unlikeliness(&curve).map_or(f64::NAN, |(own, ..)| own);
+    let from_truth = unlikeliness(&truth);
+    let oracle = from_truth.as_ref().map_or_else(
         || "none".to_owned(),
-        |(truth, j)| {
+        |(truth, j, _)| {
             let (un, off, chi) = (j.unexplained, j.outside, j.chi_per_point());
             format!("{truth:7.2} un {un:.2} off {off:.2} {chi:.4}")
         },
     );
+
+    let from_truth = from_truth
+        .map(|(.., fitted)| -> Result<_, Box<dyn Error + Send + Sync>> {
+            let points = fitted.sample(curve.len());
+            let hausdorff = curve_scores(&points, &truth, 0.5 * unit_per_px)?.hausdorff;
+            Ok([hausdorff / unit_per_px, hausdorff, table_scores(&points, &truth)?.overall])
+        })
+        .transpose()?;
 
     let d = &found.diagnostics;
     let o = d.outline.ok_or("no outline diagnostics")?;
@@ -167,6 +193,7 @@ fn study(
         table: [table.overall, table.max_error],
         seconds,
         suspect,
+        from_truth,
     })
 }
 
@@ -230,5 +257,17 @@ fn summary(lines: &[Line]) {
         lines.iter().filter(|l| l.hausdorff_px > 5.0 && !l.suspect).count(),
         lines.iter().filter(|l| l.hausdorff_px <= 5.0 && l.suspect).count(),
     );
+    let mut floors: Vec<[f64; 3]> = lines.iter().filter_map(|l| l.from_truth).collect();
+    floors.sort_by(|a, b| a[1].total_cmp(&b[1]));
+    if let Some(largest) = floors.get(((floors.len() - 1) as f64 * 0.95).round() as usize) {
+        println!(
+            "fit from the truth: {} of {} wrong | Hausdorff p95 {:.2} px {:.3} world | table Overall mean {:.4}",
+            floors.iter().filter(|f| f[0] > 5.0).count(),
+            floors.len(),
+            largest[0],
+            largest[1],
+            floors.iter().map(|f| f[2]).sum::<f64>() / floors.len() as f64,
+        );
+    }
     println!("wrong {wrong}, of these not flagged {missed}; right but flagged {alarms}");
 }

@@ -79,7 +79,7 @@ pub use picture::picture_svg;
 pub use reconstruct::{Closure, Params, reconstruct};
 pub use reconstruction::{Reconstruction, Traces};
 pub use report::{Provenance, report_html};
-pub use robust::{Evidence, RobustParams, SecondLook, Suspicion};
+pub use robust::{DoubtLimits, Evidence, RobustParams, SecondLook, Suspicion};
 pub use segment::segment_images;
 
 /// The statement that stands in every report: this is research software.

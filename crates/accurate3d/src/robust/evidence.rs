@@ -1,13 +1,13 @@
 use accurate_fit::OutlineFit;
 use accurate_geom::{Curve3, Rig, View};
 use accurate_traverse::Walk;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::score::{BENDING, Candidate, MISFIT};
 use super::shape::{Shape, px_per_unit_along};
 
 /// What bears on whether a chosen curve is the right one, all known without the truth.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Boundary points of both outlines.
     pub boundary_points: usize,
@@ -49,49 +49,6 @@ impl Evidence {
     /// What a score counts of it that does not depend on how many boundary points there are.
     pub(crate) fn cost(&self) -> f64 {
         MISFIT * (self.unexplained + self.outside) + BENDING * self.bending
-    }
-
-    /// Names of [`Evidence::terms`].
-    pub const TERMS: [&'static str; 15] = [
-        "unexplained",
-        "outside",
-        "chi per point",
-        "worst chi per point",
-        "margin",
-        "distance of the walks",
-        "uncovered",
-        "walks behind",
-        "overlap",
-        "bridges",
-        "junctions",
-        "sigma",
-        "along epipolar lines",
-        "last move",
-        "bending",
-    ];
-
-    /// The evidence on scales on which more is worse and nothing runs away: the terms of a linear
-    /// rule.
-    pub fn terms(&self) -> [f64; Self::TERMS.len()] {
-        let log = |value: f64, unit: f64| (value.max(0.0) / unit).ln_1p();
-        let chi = |value: f64| (18.0 * value.max(1e-3)).ln();
-        [
-            log(self.unexplained, 0.05),
-            log(self.outside, 0.05),
-            chi(self.chi_per_point),
-            chi(self.worst_chi_per_point),
-            self.margin.map_or(0.0, |margin| 1.0 / (1.0 + margin.max(0.0))),
-            log(self.walks_distance_px, 0.1),
-            log(self.uncovered, 0.02),
-            log(self.walks_behind, 0.5),
-            self.overlap,
-            log(self.bridges as f64, 1.0),
-            log(self.junctions as f64, 1.0),
-            log(self.sigma_px, 0.3),
-            self.along_epipolar_line,
-            log(self.last_move_px, 0.3),
-            log(self.bending, 0.05),
-        ]
     }
 
     pub(crate) fn new(

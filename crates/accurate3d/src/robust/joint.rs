@@ -8,7 +8,7 @@ use super::evidence::Evidence;
 use super::frame::Turn;
 use super::grey_levels::{choose_by_grey_levels, on_grey_levels};
 use super::look::{Look, Seen};
-use super::suspicion::{Limits, Suspicion, calls_for_the_pictures, suspicions};
+use super::suspicion::{DoubtLimits, Suspicion, calls_for_the_pictures};
 use crate::{Closure, Error, Explanation, IntensityDiagnostics};
 
 /// How hard the joint choice looks.
@@ -164,9 +164,13 @@ pub(crate) fn reconstruct_masks(
     case: &str,
 ) -> Result<JointResult, Error> {
     let look = |turn| Look { masks, probabilities, rig, params, closure, turn, case }.look();
-    let limits = if probabilities.is_some() { &Limits::MAPS } else { &Limits::MASKS };
+    let [limits, to_look_on] = match (probabilities, &params.calibration) {
+        (Some(_), _) => [&DoubtLimits::MAPS; 2],
+        (None, None) => [&DoubtLimits::MASKS, &DoubtLimits::MASKS_TO_LOOK_ON],
+        (None, Some(_)) => [&DoubtLimits::MASKS_WITH_CALIBRATION, &DoubtLimits::MASKS_TO_LOOK_ON],
+    };
     let worth_it =
-        |seen: &Seen| !seen.is_hopeless() && !suspicions(&seen.evidence(), limits).is_empty();
+        |seen: &Seen| !seen.is_hopeless() && !seen.evidence().suspicions(to_look_on).is_empty();
     let mut seen = look(Turn::NONE)?;
     for turn in Turn::OTHERS {
         // Every pair of closed walks has been fitted from everywhere.

@@ -10,7 +10,7 @@ use super::frame::Turn;
 use super::joint::JointResult;
 use super::score::Candidate;
 use super::search::{Effort, Search};
-use super::suspicion::{Limits, calls_for_a_second_look, suspicions};
+use super::suspicion::{DoubtLimits, calls_for_a_second_look};
 use crate::{Closure, Error, Explanation};
 
 /// What a look at the images takes.
@@ -126,7 +126,7 @@ impl Seen {
         self.others.iter().filter(move |other| !other.shape.is_like(best, RIVAL_PX))
     }
 
-    pub(crate) fn into_result(self, limits: &Limits) -> JointResult {
+    pub(crate) fn into_result(self, limits: &DoubtLimits) -> JointResult {
         let evidence = self.evidence();
         let Settled { choice, fits, .. } = &self.settled;
         let rivals = choice.finalists[fits.len()..].iter().chain(self.rivals());
@@ -147,7 +147,7 @@ impl Seen {
             mean_distance_px: best.mean_distance_px,
             fits: tried,
             calibration: calibrations.swap_remove(0),
-            suspicions: suspicions(&evidence, limits),
+            suspicions: evidence.suspicions(limits),
             evidence,
             fit: best.fit,
         }

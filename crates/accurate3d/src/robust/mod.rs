@@ -27,5 +27,5 @@ pub use joint::{RobustParams, SecondLook};
 pub(crate) use search::SAME_PX;
 pub(crate) use shape::px_per_unit;
 pub(crate) use strays::without_strays;
-pub use suspicion::Suspicion;
 pub(crate) use suspicion::calls_for_a_careful_look;
+pub use suspicion::{DoubtLimits, Suspicion};

@@ -28,24 +28,41 @@ pub enum Suspicion {
     NotAdjusted,
 }
 
-/// Limits of the evidence, beyond which it is a reason: a result without a reason is likely, not
-/// certain, to be right. docs/deviations.md (masks) and docs/segmentation.md (maps) show what they catch
-/// and what they cost.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Limits {
-    unexplained: f64,
+/// Limits of the [`Evidence`], beyond which it is a reason for doubt: a result without a reason is
+/// likely, not certain, to be right. docs/decisions/limits-of-doubt.md (masks) and
+/// docs/segmentation.md (maps) show what they catch and what they cost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DoubtLimits {
+    /// Most of [`Evidence::unexplained`], for up to 3,000 boundary points; for more in proportion.
+    pub unexplained: f64,
     /// The same where a walk takes bridges: the faces of what hides the body are no one's outline.
-    unexplained_at_bridges: f64,
-    chi_per_point_px2: f64,
-    margin: f64,
-    sigma_px: f64,
+    pub unexplained_at_bridges: f64,
+    /// Most of [`Evidence::chi_per_point`], px².
+    pub chi_per_point_px2: f64,
+    /// Least [`Evidence::margin`].
+    pub margin: f64,
+    /// Most of [`Evidence::sigma_px`], px, for as many; for more with their square root: of more stretches
+    /// one is seen worse.
+    pub sigma_px: f64,
 }
 
-impl Limits {
-    /// Of masks that hold the body: chosen on 840 generated pairs of tuning seeds (`doubt_study`; `easy`,
-    /// `medium` also with discs or turned, `hard`, `carm` also off in calibration; 25 of them wrong by
-    /// more than 5 px).
-    pub(crate) const MASKS: Self = Self {
+impl DoubtLimits {
+    /// Of masks that hold the body, after all looks: chosen on 1,240 generated pairs of tuning seeds
+    /// (docs/decisions/limits-of-doubt.md).
+    pub const MASKS: Self = Self {
+        unexplained: 0.12,
+        unexplained_at_bridges: 0.6,
+        chi_per_point_px2: 0.068,
+        margin: 2.0,
+        sigma_px: 1.1,
+    };
+
+    /// The same where the calibration is an unknown: what is not known of it adds to every depth.
+    pub const MASKS_WITH_CALIBRATION: Self = Self { sigma_px: 1.9, ..Self::MASKS };
+
+    /// Of the same masks, beyond which a harder look is worth its time: most of what is doubted then is
+    /// mended, or was right.
+    pub(crate) const MASKS_TO_LOOK_ON: Self = Self {
         unexplained: 0.04,
         unexplained_at_bridges: 0.7,
         chi_per_point_px2: 0.068,
@@ -56,7 +73,7 @@ impl Limits {
     /// Of a network's probability maps, which add short pieces to right curves, and whose points lie
     /// nearer to a right one than whole pixels: chosen on 340 generated pairs of images of tuning
     /// seeds (`medium`, `carm`, `easy`; 31 of them wrong by more than 5 px).
-    pub(crate) const MAPS: Self = Self {
+    pub const MAPS: Self = Self {
         unexplained: 1.0,
         unexplained_at_bridges: 1.0,
         chi_per_point_px2: 0.058,
@@ -86,29 +103,32 @@ const UNCOVERED: f64 = 0.1;
 /// doubt after it.
 const MARGIN_TO_LOOK_AGAIN: f64 = 4.0;
 
-/// The reasons to doubt a final choice, in the order of [`Suspicion`].
-pub(crate) fn suspicions(evidence: &Evidence, limits: &Limits) -> Vec<Suspicion> {
-    let (e, l) = (evidence, limits);
-    let bridged = e.bridges > 0 && e.overlap < OVERLAP_AT_BRIDGES;
-    let unexplained = if bridged { l.unexplained_at_bridges } else { l.unexplained };
-    [
-        (e.unexplained > allowance(e.boundary_points) * unexplained, Suspicion::UnexplainedOutline),
-        (e.outside > OUTSIDE, Suspicion::OutsideMask),
-        (e.chi_per_point > l.chi_per_point_px2, Suspicion::Misfit),
-        (has_rival(e, l.margin), Suspicion::Ambiguous),
-        (e.walks_distance_px > DISTANCE_PX, Suspicion::ViewsDisagree),
-        (e.uncovered > UNCOVERED, Suspicion::Uncovered),
-        (e.sigma_px > l.sigma_px, Suspicion::Uncertain),
-    ]
-    .into_iter()
-    .filter_map(|(holds, reason)| holds.then_some(reason))
-    .collect()
+impl Evidence {
+    /// The reasons to doubt a final choice, in the order of [`Suspicion`].
+    pub fn suspicions(&self, limits: &DoubtLimits) -> Vec<Suspicion> {
+        let bridged = self.bridges > 0 && self.overlap < OVERLAP_AT_BRIDGES;
+        let most = if bridged { limits.unexplained_at_bridges } else { limits.unexplained };
+        let allowance = allowance(self.boundary_points);
+        [
+            (self.unexplained > allowance * most, Suspicion::UnexplainedOutline),
+            (self.outside > OUTSIDE, Suspicion::OutsideMask),
+            (self.chi_per_point > limits.chi_per_point_px2, Suspicion::Misfit),
+            (has_rival(self, limits.margin), Suspicion::Ambiguous),
+            (self.walks_distance_px > DISTANCE_PX, Suspicion::ViewsDisagree),
+            (self.uncovered > UNCOVERED, Suspicion::Uncovered),
+            (self.sigma_px > allowance.sqrt() * limits.sigma_px, Suspicion::Uncertain),
+        ]
+        .into_iter()
+        .filter_map(|(holds, reason)| holds.then_some(reason))
+        .collect()
+    }
 }
 
 /// Whether a first choice is worth a second look: by the limits of masks in either case, for what a
 /// map leaves unexplained may be explained better.
 pub(crate) fn calls_for_a_second_look(evidence: &Evidence) -> bool {
-    has_rival(evidence, MARGIN_TO_LOOK_AGAIN) || !suspicions(evidence, &Limits::MASKS).is_empty()
+    has_rival(evidence, MARGIN_TO_LOOK_AGAIN)
+        || !evidence.suspicions(&DoubtLimits::MASKS_TO_LOOK_ON).is_empty()
 }
 
 /// Walks this much dearer than the cheapest of each view are worth asking on, though the curves of most are
@@ -130,7 +150,7 @@ pub(crate) fn calls_for_a_careful_look(evidence: &Evidence) -> bool {
 
 fn is_worth_asking_on(evidence: &Evidence, counts: fn(&Suspicion) -> bool) -> bool {
     evidence.walks_behind > BEHIND_TO_ASK_ON
-        || suspicions(evidence, &Limits::MAPS_TO_ASK_ON).iter().any(counts)
+        || evidence.suspicions(&DoubtLimits::MAPS_TO_ASK_ON).iter().any(counts)
 }
 
 fn has_rival(evidence: &Evidence, closer_than: f64) -> bool {
@@ -157,7 +177,7 @@ mod tests {
     use super::*;
 
     fn of_masks(evidence: &Evidence) -> Vec<Suspicion> {
-        suspicions(evidence, &Limits::MASKS)
+        evidence.suspicions(&DoubtLimits::MASKS)
     }
 
     const GOOD: Evidence = Evidence {
@@ -197,19 +217,27 @@ mod tests {
     }
 
     #[test]
-    fn a_long_outline_may_leave_more_unexplained_in_proportion() {
-        let long = Evidence { boundary_points: 9000, unexplained: 0.1, ..GOOD };
+    fn a_long_outline_may_leave_more_unexplained_and_be_seen_worse() {
+        let long = Evidence { boundary_points: 9000, unexplained: 0.3, sigma_px: 1.8, ..GOOD };
         assert!(of_masks(&long).is_empty());
         let shorter = Evidence { boundary_points: 6000, ..long };
-        assert_eq!(of_masks(&shorter), [Suspicion::UnexplainedOutline]);
-        let short = Evidence { boundary_points: 800, unexplained: 0.03, ..GOOD };
+        assert_eq!(of_masks(&shorter), [Suspicion::UnexplainedOutline, Suspicion::Uncertain]);
+        // No less is asked of short ones.
+        let short = Evidence { boundary_points: 800, unexplained: 0.1, sigma_px: 1.0, ..GOOD };
         assert!(of_masks(&short).is_empty());
+    }
+
+    #[test]
+    fn an_unknown_calibration_may_leave_depths_less_sure() {
+        let evidence = Evidence { sigma_px: 1.5, ..GOOD };
+        assert_eq!(of_masks(&evidence), [Suspicion::Uncertain]);
+        assert!(evidence.suspicions(&DoubtLimits::MASKS_WITH_CALIBRATION).is_empty());
     }
 
     #[test]
     fn a_rival_that_stays_behind_calls_for_a_second_look_only() {
         let rival = |margin| Evidence { margin: Some(margin), ..GOOD };
-        let close = 0.5 * (Limits::MASKS.margin + MARGIN_TO_LOOK_AGAIN);
+        let close = 0.5 * (DoubtLimits::MASKS.margin + MARGIN_TO_LOOK_AGAIN);
         assert!(of_masks(&rival(close)).is_empty());
         assert!(calls_for_a_second_look(&rival(close)));
         assert!(!calls_for_a_second_look(&rival(MARGIN_TO_LOOK_AGAIN)));
@@ -228,7 +256,7 @@ mod tests {
 
     #[test]
     fn a_map_may_leave_short_pieces_unexplained_but_its_points_must_lie_nearer() {
-        let of_maps = |evidence: &Evidence| suspicions(evidence, &Limits::MAPS);
+        let of_maps = |evidence: &Evidence| evidence.suspicions(&DoubtLimits::MAPS);
         let pieces = Evidence { unexplained: 0.5, chi_per_point: 0.04, ..GOOD };
         assert!(of_maps(&pieces).is_empty());
         assert_eq!(of_masks(&pieces), [Suspicion::UnexplainedOutline]);
@@ -246,14 +274,14 @@ mod tests {
             Evidence { margin: Some(4.0), ..maps },
             Evidence { walks_behind: 3.0, ..maps },
         ] {
-            assert!(suspicions(&evidence, &Limits::MAPS).is_empty());
+            assert!(evidence.suspicions(&DoubtLimits::MAPS).is_empty());
             assert!(calls_for_the_pictures(&evidence) && calls_for_a_careful_look(&evidence));
         }
         // Noise and depth stay as they are in another segmentation.
         for evidence in
             [Evidence { sigma_px: 1.5, ..maps }, Evidence { chi_per_point: 0.057, ..maps }]
         {
-            assert!(suspicions(&evidence, &Limits::MAPS).is_empty());
+            assert!(evidence.suspicions(&DoubtLimits::MAPS).is_empty());
             assert!(calls_for_the_pictures(&evidence) && !calls_for_a_careful_look(&evidence));
         }
     }
