@@ -139,7 +139,7 @@ fn limits(files: &[&str]) -> Result<(), Failure> {
 fn grid() -> impl Iterator<Item = DoubtLimits> {
     let unexplained = [0.03, 0.04, 0.06, 0.08, 0.12, 0.2];
     let each = unexplained.into_iter().flat_map(|unexplained| {
-        [0.5, 0.7, 1.0].map(|unexplained_at_bridges| DoubtLimits {
+        [0.5, 0.6, 0.7, 1.0].map(|unexplained_at_bridges| DoubtLimits {
             unexplained,
             unexplained_at_bridges,
             ..DoubtLimits::MASKS

@@ -259,7 +259,9 @@ fn summary(lines: &[Line]) {
     );
     let mut floors: Vec<[f64; 3]> = lines.iter().filter_map(|l| l.from_truth).collect();
     floors.sort_by(|a, b| a[1].total_cmp(&b[1]));
-    if let Some(largest) = floors.get(((floors.len() - 1) as f64 * 0.95).round() as usize) {
+    if let Some(largest) =
+        floors.get((floors.len().saturating_sub(1) as f64 * 0.95).round() as usize)
+    {
         println!(
             "fit from the truth: {} of {} wrong | Hausdorff p95 {:.2} px {:.3} world | table Overall mean {:.4}",
             floors.iter().filter(|f| f[0] > 5.0).count(),
