@@ -62,7 +62,18 @@ impl OutlineFitParams {
         ..Self::DEFAULT
     };
 
-    /// The same for a start that is a converged fit: its last settings from the first step on.
+    /// For a start that is a fit already, of a curve that bends more than the usual knots and smoothness
+    /// allow.
+    pub const FINE: Self = Self {
+        cauchy_scale_start_px: Self::DEFAULT.cauchy_scale_px,
+        subsample: false,
+        knot_spacing_px: 4.0,
+        lambda3: 0.03,
+        lambda3_start: 0.03,
+        ..Self::DEFAULT
+    };
+
+    /// These for a start that is a converged fit: their last settings from the first step on.
     pub(crate) fn settled(&self) -> Self {
         Self {
             lambda3_start: self.lambda3,

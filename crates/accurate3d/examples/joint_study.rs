@@ -29,16 +29,6 @@ use rayon::prelude::*;
 const SURPRISE_PER_SCORE: f64 = 12.0;
 const MISFIT: f64 = 2.0;
 
-/// For curves that bend more than the usual knots allow, from a start that is right.
-const FINE: OutlineFitParams = OutlineFitParams {
-    cauchy_scale_start_px: OutlineFitParams::DEFAULT.cauchy_scale_px,
-    subsample: false,
-    knot_spacing_px: 4.0,
-    lambda3: 0.03,
-    lambda3_start: 0.03,
-    ..OutlineFitParams::DEFAULT
-};
-
 struct Line {
     text: String,
     hausdorff_px: f64,
@@ -135,7 +125,8 @@ fn study(
             let misfit = judgement.unexplained + judgement.outside;
             Some((fit.surprise? / SURPRISE_PER_SCORE + MISFIT * misfit, judgement, fit.curve))
         };
-        let fits = [OutlineFitParams::DEFAULT, FINE].iter().filter_map(likeliness);
+        let fits =
+            [OutlineFitParams::DEFAULT, OutlineFitParams::FINE].iter().filter_map(likeliness);
         fits.min_by(|a, b| a.0.total_cmp(&b.0))
     };
     let own = unlikeliness(&curve).map_or(f64::NAN, |(own, ..)| own);

@@ -39,8 +39,11 @@ pub(crate) const SETTLED: OutlineFitParams = OutlineFitParams {
 };
 
 /// The same for curves that bend more than the usual knots and smoothness allow.
-pub(crate) const FINE: OutlineFitParams =
-    OutlineFitParams { knot_spacing_px: 4.0, lambda3: 0.03, lambda3_start: 0.03, ..SETTLED };
+pub(crate) const FINE: OutlineFitParams = OutlineFitParams {
+    iterations: SETTLED.iterations,
+    tolerance: SETTLED.tolerance,
+    ..OutlineFitParams::FINE
+};
 
 /// Steps of the last fit before those that find its smoothness too.
 const LAST_ITERATIONS: usize = 3;
