@@ -48,6 +48,15 @@ pub(crate) fn not_negative(what: &'static str, value: f64) -> Result<(), MatchEr
     Err(GeomError::OutOfRange { what, value, expected: "0 or more" }.into())
 }
 
+/// Refuses what is nothing to weigh or to weigh by: infinity times 0 would be no number.
+pub(crate) fn finite(what: &'static str, value: f64) -> Result<(), MatchError> {
+    not_negative(what, value)?;
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(GeomError::OutOfRange { what, value, expected: "a finite number" }.into())
+}
+
 /// Refuses what is no size: positive and finite.
 pub(crate) fn positive(what: &'static str, value: f64) -> Result<(), MatchError> {
     if value > 0.0 && value.is_finite() {

@@ -1,6 +1,6 @@
 use accurate_geom::{EpipolarAngle, Pixel, View, View1, View2};
 
-use crate::ends::{FreeEnds, not_negative, positive};
+use crate::ends::{FreeEnds, finite, not_negative, positive};
 use crate::interval_dp::{IntervalDp, Lane, energy};
 use crate::{AngleProfile, AngleSignal, IntervalPrices, MatchError};
 
@@ -99,7 +99,7 @@ impl Default for ProposeParams {
 ///
 /// # Errors
 /// As [`AngleProfile::of_view1`] for any candidate; [`MatchError::Geometry`] for parameters or costs
-/// that are negative, NaN or, where sizes, infinite.
+/// that are negative, NaN or, but for tolerances and prices, infinite.
 ///
 /// # Cost
 /// O(n1·n2) pairs, a few ns per cell of each alignment; about 5 ms for 64 x 64 candidates of 430 px.
@@ -125,12 +125,12 @@ fn validate(params: &ProposeParams) -> Result<(), MatchError> {
     params.prices.validate()?;
     positive("coarse_step_px", params.coarse_step_px)?;
     positive("fine_step_px", params.fine_step_px)?;
-    not_negative("energy_weight", params.energy_weight)?;
+    finite("energy_weight", params.energy_weight)?;
     not_negative("end_tolerance_px", params.end_tolerance_px)?;
-    not_negative("end_weight", params.end_weight)?;
-    not_negative("end_limit_px", params.end_limit_px)?;
+    finite("end_weight", params.end_weight)?;
+    finite("end_limit_px", params.end_limit_px)?;
     not_negative("doubled_tolerance_px", params.doubled_tolerance_px)?;
-    not_negative("doubled_weight", params.doubled_weight)
+    finite("doubled_weight", params.doubled_weight)
 }
 
 /// What is computed once per candidate.
@@ -150,8 +150,8 @@ fn candidates<V: View>(
     profile: impl Fn(&[Pixel<V>]) -> Result<AngleProfile, MatchError>,
 ) -> Result<Vec<Candidate>, MatchError> {
     let candidate = |curve: &SignalCurve<'_, V>| {
-        not_negative("cost of a candidate", curve.cost)?;
-        not_negative("doubled_px", curve.doubled_px)?;
+        finite("cost of a candidate", curve.cost)?;
+        finite("doubled_px", curve.doubled_px)?;
         let profile = profile(curve.points)?;
         Ok(Candidate {
             cost: curve.cost,

@@ -329,15 +329,18 @@ fn unusable_input_is_refused_by_name() {
         SignalCurve { free: FreeEnds { begin_px: -1.0, end_px: 0.0 }, ..curve(&point, 0.0) },
         &default
     )));
-    assert!(out_of_range(propose(
-        SignalCurve { doubled_px: f64::NAN, ..curve(&point, 0.0) },
-        &default
-    )));
+    for doubled_px in [f64::NAN, f64::INFINITY] {
+        let doubled = SignalCurve { doubled_px, ..curve(&point, 0.0) };
+        assert!(out_of_range(propose(doubled, &default)));
+    }
+    assert!(out_of_range(propose(curve(&point, f64::INFINITY), &default)));
     for params in [
         ProposeParams { fine_step_px: 0.0, ..default },
         ProposeParams { coarse_step_px: f64::INFINITY, ..default },
         ProposeParams { end_weight: -1.0, ..default },
         ProposeParams { doubled_weight: f64::NAN, ..default },
+        ProposeParams { doubled_weight: f64::INFINITY, ..default },
+        ProposeParams { end_limit_px: f64::INFINITY, ..default },
         ProposeParams { doubled_tolerance_px: -1.0, ..default },
         ProposeParams {
             prices: IntervalPrices { cap_px: f64::NAN, ..IntervalPrices::DEFAULT },

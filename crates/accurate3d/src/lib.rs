@@ -16,7 +16,7 @@
 //! let masks = [io::read_mask("a_mask.png".as_ref())?, io::read_mask("b_mask.png".as_ref())?];
 //! let pair = ViewPair { masks: Some(masks), ..ViewPair::new("case_017", rig) };
 //! let curve = reconstruct(&pair, &Params::new(InputKind::Mask, Method::Accurate))?;
-//! for doubt in &curve.diagnostics.suspicions {
+//! for doubt in curve.diagnostics.reasons() {
 //!     println!("{}: {doubt}", curve.id);
 //! }
 //! io::write_curve("wire.vtp".as_ref(), &curve.curve_table())?;
@@ -56,6 +56,7 @@ mod ordered_points;
 mod pair;
 mod picture;
 pub mod plan;
+mod reasons;
 mod reconstruct;
 mod reconstruction;
 mod report;

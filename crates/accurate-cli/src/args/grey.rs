@@ -27,3 +27,10 @@ pub enum Photometric {
     /// The stored values are inverted: the body is brighter.
     Monochrome1,
 }
+
+impl Photometric {
+    /// As the option names it.
+    pub fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+}

@@ -268,7 +268,7 @@ fn one(
     let mut result = result_json(&shown, inputs, &pair, &params, &reconstruction)?;
     if let Some(segmenter) = segmenter {
         result["parameters"]["segmentation"] = Value::from(segmenter.describe());
-        result["parameters"]["polarity"] = Value::from(format!("{polarity:?}"));
+        result["parameters"]["photometric"] = Value::from(args.grey.photometric.name());
     }
     out.write(&pair, &reconstruction, &result)?;
     let doubted = !reconstruction.diagnostics.suspicions.is_empty();
@@ -318,12 +318,8 @@ pub fn result_json(
 /// One line for a reader.
 pub fn summary(reconstruction: &Reconstruction) -> String {
     let d = &reconstruction.diagnostics;
-    let suspect = if d.suspicions.is_empty() {
-        String::new()
-    } else {
-        let reasons: Vec<String> = d.suspicions.iter().map(|s| s.to_string()).collect();
-        format!(", suspect: {}", reasons.join(", "))
-    };
+    let reasons = d.reasons().join(", ");
+    let suspect = if reasons.is_empty() { reasons } else { format!(", suspect: {reasons}") };
     format!(
         "{}: {} points, {:.1} {}, mean epipolar distance {:.2} px, coverage {:.1} % / {:.1} %{suspect}",
         reconstruction.id,

@@ -136,7 +136,7 @@ fn bright_bodies_give_the_curve_of_dark_ones() {
     assert_eq!(run(&pair, &out, &["--photometric", "monochrome1"]), dark);
     let result: Value =
         serde_json::from_slice(&fs::read(out.join("result.json")).unwrap()).unwrap();
-    assert_eq!(result["parameters"]["polarity"], "BodyBright");
+    assert_eq!(result["parameters"]["photometric"], "monochrome1");
 }
 
 #[test]

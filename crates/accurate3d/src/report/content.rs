@@ -29,7 +29,7 @@ pub(super) fn content(
         "input": r.input.name(),
         "unit": r.unit.label(),
         "note": NOT_FOR_CLINICAL_USE,
-        "suspicions": r.diagnostics.suspicions.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "suspicions": r.diagnostics.reasons(),
         "diagnostics": r.diagnostics,
         "scores": scores,
         "curve": curve(r, digits),

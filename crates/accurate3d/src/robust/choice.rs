@@ -3,8 +3,9 @@ use accurate_geom::{Rig, View1, View2};
 
 use super::candidates::ViewCandidates;
 use super::evidence::{Evidence, Walks};
+use super::pairs::Tried;
 use super::score::Candidate;
-use super::search::{Effort, Search, Tried};
+use super::search::{Effort, Search};
 use super::side_by_side::side_by_side;
 use crate::Error;
 

@@ -1,8 +1,11 @@
 use accurate_geom::Point3;
 use accurate_match::longest_chain;
 
+use super::finalists::SAME_PX;
+use super::fitting::PLAIN;
+use super::restart::BRIDGED_PX;
 use super::score::Candidate;
-use super::search::{BRIDGED_PX, Effort, PLAIN, SAME_PX, Search};
+use super::search::{Effort, Search};
 use super::shape::{dense, px_per_unit};
 use super::side_by_side::side_by_side;
 use super::start::through;

@@ -6,10 +6,10 @@ use accurate_geom::Rig;
 use ndarray::Array2;
 
 use super::RobustParams;
+use super::finalists::SAME_PX;
 use super::joint::JointResult;
 use super::look::Seen;
 use super::score::Candidate;
-use super::search::SAME_PX;
 use super::side_by_side::side_by_side;
 use crate::IntensityDiagnostics;
 

@@ -2,8 +2,9 @@ use accurate_fit::OutlineFitParams;
 use accurate_geom::{Curve3, Point3, View1, View2};
 
 use super::candidates::ViewCandidates;
+use super::pairs::Tried;
 use super::score::Candidate;
-use super::search::{Search, Tried};
+use super::search::Search;
 use super::shape::{dense, is_shown_near, px_per_unit};
 use super::side_by_side::side_by_side;
 use super::start::through;
@@ -65,11 +66,10 @@ impl Search<'_> {
                 starts.extend(start.map(|start| (start, plain)));
             }
         }
-        let refitted = |(start, params): &(Curve3, OutlineFitParams)| {
-            let fit = self.fit(start, params)?;
-            Some(from.refitted(fit, from.settings, self.rig))
+        let moved = |(start, params): &(Curve3, OutlineFitParams)| {
+            self.anew(from, start, params, from.settings)
         };
-        side_by_side(&starts, refitted).into_iter().flatten().collect()
+        side_by_side(&starts, moved).into_iter().flatten().collect()
     }
 
     /// Whether there is unexplained outline within reach of an end.

@@ -2,9 +2,11 @@ use accurate_fit::OutlineFitParams;
 use accurate_geom::{Camera, Curve3, Pixel, Point2, Point3, Polyline, Rig, View};
 use accurate_match::FreeEnds;
 
+use super::finalists::SAME_PX;
+use super::fitting::{PLAIN, SETTLED};
 use super::other_ways::{OtherWay, other_ways};
 use super::score::Candidate;
-use super::search::{Effort, PLAIN, SAME_PX, SETTLED, Search};
+use super::search::{Effort, Search};
 use super::shape::{Shape, dense, px_per_unit};
 use super::side_by_side::side_by_side;
 use super::start::{PRICES, start_from, through};
@@ -33,10 +35,7 @@ impl Search<'_> {
                 !finalists.iter().any(|known| shape.is_along(&known.shape, SAME_PX))
             });
             let others = side_by_side(&starts.take(most).collect::<Vec<_>>(), |start| {
-                let fit = self.fit(start, &PLAIN)?;
-                let mut other = candidate.refitted(fit, SETTLED, self.rig);
-                other.good = other.is_good(self.params);
-                Some(other)
+                self.anew(candidate, start, &PLAIN, SETTLED)
             });
             others.into_iter().flatten().collect::<Vec<_>>()
         };

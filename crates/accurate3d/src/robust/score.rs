@@ -2,7 +2,7 @@ use accurate_fit::{OutlineFit, OutlineFitParams, UnexplainedStretch};
 use accurate_geom::Rig;
 
 use super::RobustParams;
-use super::search::SETTLED;
+use super::fitting::SETTLED;
 use super::shape::{Shape, bending};
 use crate::ConsideredCurve;
 
