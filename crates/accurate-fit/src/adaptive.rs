@@ -55,6 +55,14 @@ impl AdaptiveParams {
                 return Err(FitError::BadParameter { name, value });
             }
         }
+        for (name, value) in [
+            ("max_unexplained", self.max_unexplained),
+            ("min_knot_spacing_px", self.min_knot_spacing_px),
+        ] {
+            if !(value >= 0.0) {
+                return Err(FitError::BadParameter { name, value });
+            }
+        }
         Ok(())
     }
 }

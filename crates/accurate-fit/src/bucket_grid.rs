@@ -65,7 +65,8 @@ impl BucketGrid {
             return (0..0, 0..0);
         }
         // Empty if it begins behind the last.
-        (r0..(y1 as usize + 1).min(self.rows), c0..(x1 as usize + 1).min(self.columns))
+        let behind = |v: f64, count: usize| (v as usize).saturating_add(1).min(count);
+        (r0..behind(y1, self.rows), c0..behind(x1, self.columns))
     }
 
     /// The sorted points of some columns of a row of buckets.

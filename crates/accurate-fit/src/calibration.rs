@@ -77,7 +77,10 @@ impl CalibrationEstimate {
         k[(1, 2)] += self.shift_px[1];
         let (s, c) = self.roll_rad.sin_cos();
         let roll = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
-        let camera2 = Camera::new(k, roll * camera.r(), roll * camera.t(), camera.size())?;
+        let mut camera2 = Camera::new(k, roll * camera.r(), roll * camera.t(), camera.size())?;
+        if let Some(lens) = camera.distortion() {
+            camera2 = camera2.with_distortion(*lens)?;
+        }
         Ok(Rig::new(rig.camera1().clone(), camera2, rig.unit())?)
     }
 
@@ -112,8 +115,8 @@ impl CalibrationEstimate {
 /// A fit that allowed for an error of the calibration.
 #[derive(Debug, Clone)]
 pub struct CalibratedFit {
-    /// The curve, in the frame of view 1's camera, and its covariance, which includes what the
-    /// calibration leaves uncertain.
+    /// The curve, in the world frame of the rig whose view 1 is taken as exact, and its covariance,
+    /// which includes what the calibration leaves uncertain.
     pub fit: OutlineFit,
     /// The calibration's correction.
     pub calibration: CalibrationEstimate,

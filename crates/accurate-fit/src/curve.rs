@@ -52,13 +52,15 @@ pub(crate) fn from_curve(curve: &Curve3) -> Option<UniformSpline> {
     Some(UniformSpline { control })
 }
 
-/// Points along a curve, 16 per stretch between knots, ends included.
-pub(crate) fn dense_points(curve: &Curve3) -> Vec<Point3> {
+/// Points along a curve, as many in each stretch between knots: 16, or so many that they are `least`.
+/// Ends included.
+pub(crate) fn dense_points(curve: &Curve3, least: usize) -> Vec<Point3> {
     let breakpoints = curve.breakpoints();
-    let mut points = Vec::with_capacity(16 * breakpoints.len());
+    let each = least.div_ceil(breakpoints.len() - 1).max(16);
+    let mut points = Vec::with_capacity(each * breakpoints.len());
     for pair in breakpoints.windows(2) {
         let width = pair[1] - pair[0];
-        points.extend((0..16).map(|k| curve.at(pair[0] + width * f64::from(k) / 16.0)));
+        points.extend((0..each).map(|k| curve.at(pair[0] + width * k as f64 / each as f64)));
     }
     points.push(curve.at(curve.domain().1));
     points

@@ -41,6 +41,16 @@ pub enum FitError {
         /// Rows and columns of the map.
         found: (usize, usize),
     },
+    /// A map holds something else than probabilities, 0 to 1: logits, or grey values up to 255.
+    #[error("view {view}: pixel {index} of the probability map is {value}, not in 0 to 1")]
+    NotAProbability {
+        /// 1 or 2.
+        view: u8,
+        /// Index of the pixel, row by row, from 0.
+        index: usize,
+        /// Its value.
+        value: f32,
+    },
     /// A picture shows nothing along the curve.
     #[error("view {view}: the image shows nothing dark along the curve")]
     NotSeenInImage {

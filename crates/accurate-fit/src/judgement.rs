@@ -15,8 +15,9 @@ pub struct Judgement {
     /// the truth.
     pub unexplained: f64,
     /// Curve that the masks do not show: the distance outside beyond 1 px, at most 4, times how sure
-    /// a probability map is that there is no body, summed over the curve in steps of 1 px and divided
-    /// by 10 px. Zero at the truth.
+    /// a probability map is that there is no body, summed along the body in steps that are 1 px long on
+    /// average in each view, and divided by 10 px: a stretch towards the camera counts like any other.
+    /// Zero at the truth.
     pub outside: f64,
     /// Sum of squared residuals, each at most 4 px², of the boundary points used; those of a
     /// probability map in units of 1/18 px² per variance of the point.

@@ -12,6 +12,9 @@ use crate::outline_map::OutlineMap;
 /// How far around the mask a curve that left it still learns where the mask is, px.
 const MARGIN_PX: usize = 32;
 
+/// By how much rounding may carry a probability beyond 0 or 1.
+const PROBABILITY_ROUNDING: f32 = 1e-5;
+
 /// Pixels of a row that are looked at together whether any is set: most of an image is empty.
 const STRETCH: usize = 64;
 
@@ -86,8 +89,9 @@ impl<V: View> Outline<V> {
     }
 
     /// From a probability map (`height x width`, row = y) and the mask that was made of it: around
-    /// the mask, sub-pixel, where the map crosses the least probability that the mask holds. Where
-    /// the mask ends though the map goes on, the point lies between the two pixels.
+    /// the mask, sub-pixel, where the map crosses the least probability that the mask holds, or 0.05 or
+    /// 0.5 if that is lower or higher. Where the mask ends though the map goes on, the point lies between
+    /// the two pixels.
     ///
     /// Crossings are interpolated in the logit: the edge of a body that is known up to a normal error
     /// is a ramp there. The slope of the ramp gives each point's variance; how far the map rises
@@ -95,7 +99,8 @@ impl<V: View> Outline<V> {
     /// the less, the higher the map still is.
     ///
     /// # Errors
-    /// [`FitError::NotFinite`] for a pixel (index in row-major order), [`FitError::ShapeMismatch`],
+    /// [`FitError::NotFinite`] for a pixel (index in row-major order), [`FitError::NotAProbability`] for one
+    /// that is not in 0 to 1 (beyond 1e-5 for rounding), [`FitError::ShapeMismatch`],
     /// [`FitError::EmptyOutline`] if no pixel, or every pixel, of the mask is set.
     ///
     /// # Cost
@@ -108,8 +113,13 @@ impl<V: View> Outline<V> {
             let (expected, found) = (mask.dim(), probability.dim());
             return Err(FitError::ShapeMismatch { view: V::NUMBER, expected, found });
         }
-        if let Some(index) = probability.iter().position(|v| !v.is_finite()) {
-            return Err(FitError::NotFinite { what: "probability", index });
+        for (index, value) in probability.iter().copied().enumerate() {
+            if !value.is_finite() {
+                return Err(FitError::NotFinite { what: "probability", index });
+            }
+            if !(-PROBABILITY_ROUNDING..=1.0 + PROBABILITY_ROUNDING).contains(&value) {
+                return Err(FitError::NotAProbability { view: V::NUMBER, index, value });
+            }
         }
         let mut map = OutlineMap::new(probability, mask);
         let logits = map.logits();
@@ -347,5 +357,27 @@ mod tests {
             Outline::<View1>::from_probability(map.view(), mask.view()),
             Err(FitError::NotFinite { what: "probability", index: 8 })
         ));
+        map[[1, 2]] = 255.0;
+        assert!(matches!(
+            Outline::<View1>::from_probability(map.view(), mask.view()),
+            Err(FitError::NotAProbability { view: 1, index: 8, value: 255.0 })
+        ));
+    }
+
+    /// An edge between 1 and 0.2 does not jump by a third of a pixel where the 1 is one and a bit.
+    #[test]
+    fn a_probability_that_rounding_left_above_one_is_one() {
+        let mask = Array2::from_shape_fn((6, 6), |(y, _)| y == 3);
+        let at = |most: f32| {
+            let map = mask.mapv(|set| if set { most } else { 0.2 });
+            Outline::<View1>::from_probability(map.view(), mask.view()).unwrap()
+        };
+        let (one, above) = (at(1.0), at(1.0 + f32::EPSILON));
+        for (a, b) in one.points().zip(above.points()) {
+            assert_eq!((a.position, a.inward), (b.position, b.inward));
+        }
+        let variances =
+            |outline: &Outline<View1>| outline.data.map.as_ref().unwrap().variance.clone();
+        assert_eq!(variances(&one), variances(&above));
     }
 }

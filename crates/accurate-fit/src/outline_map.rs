@@ -33,7 +33,7 @@ const LOGIT_PER_SIGMA: f64 = 1.595_769_121_605_731;
 const BEHIND_PX: usize = 3;
 
 impl OutlineMap {
-    /// `probability` finite, of the shape of the mask.
+    /// `probability` from 0 to 1, of the shape of the mask.
     pub(crate) fn new(probability: ArrayView2<'_, f32>, mask: ArrayView2<'_, bool>) -> Self {
         let least = probability
             .iter()
@@ -105,7 +105,9 @@ impl OutlineMap {
     }
 }
 
+/// Of a probability, or of what rounding made of one.
 fn logit(p: f32) -> f32 {
+    let p = p.clamp(0.0, 1.0);
     (p / (1.0 - p)).ln().clamp(-MOST_LOGIT, MOST_LOGIT)
 }
 

@@ -26,13 +26,17 @@ pub struct OutlineFitParams {
     pub reach_start_px: f64,
     /// Use every 4th boundary point in the first two steps and every 2nd in the next two.
     pub subsample: bool,
-    /// Weight of a curve sample outside the mask, per px of curve.
+    /// Weight of a curve sample outside the mask, per px of curve on average over a view: by its length in
+    /// space, for what hooks towards the camera has to be held too.
     pub outside_weight: f64,
     /// First Levenberg-Marquardt damping, relative to the diagonal.
     pub damping: f64,
-    /// Stop when a step lowers the cost by less than this fraction.
+    /// Stop when a step of the last third lowers the cost by less than this fraction.
     pub tolerance: f64,
 }
+
+/// No image is wider, and squares of residuals beside the square of a larger scale are lost in rounding.
+const LARGEST: f64 = 1e5;
 
 impl OutlineFitParams {
     /// For a start within a few px of the truth.
@@ -96,7 +100,7 @@ impl OutlineFitParams {
             ("damping", self.damping),
         ];
         for (name, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
+            if !(value > 0.0 && value < LARGEST) {
                 return Err(FitError::BadParameter { name, value });
             }
         }
@@ -105,7 +109,7 @@ impl OutlineFitParams {
             ("outside_weight", self.outside_weight),
             ("tolerance", self.tolerance),
         ] {
-            if !(value >= 0.0 && value.is_finite()) {
+            if !(0.0..LARGEST).contains(&value) {
                 return Err(FitError::BadParameter { name, value });
             }
         }
@@ -114,10 +118,17 @@ impl OutlineFitParams {
 
     /// Settings of one iteration for a spline with knots `spacing_px` apart.
     pub(crate) fn settings(&self, iteration: usize, scale: &SmoothnessScale) -> Settings {
-        let stage = (3 * iteration / self.iterations.max(1)).min(2);
-        let share = stage as f64 / 2.0;
+        let all = self.iterations.max(1);
+        let stage = u8::from(iteration >= all.div_ceil(3)) + u8::from(iteration >= all - all / 3);
+        self.settings_of(stage, iteration, scale)
+    }
+
+    /// Settings of a third of the iterations: 0, 1 or 2.
+    fn settings_of(&self, stage: u8, iteration: usize, scale: &SmoothnessScale) -> Settings {
+        let share = f64::from(stage) / 2.0;
         let lambda3 = self.lambda3_start.powf(1.0 - share) * self.lambda3.powf(share);
-        let decayed = self.cauchy_scale_start_px * 0.7f64.powi(iteration as i32);
+        let decayed =
+            self.cauchy_scale_start_px * 0.7f64.powi(i32::try_from(iteration).unwrap_or(i32::MAX));
         let stride = match iteration {
             0 | 1 if self.subsample => 4,
             2 | 3 if self.subsample => 2,
@@ -155,6 +166,58 @@ impl SmoothnessScale {
 /// Settings under which a fit is judged.
 pub(crate) fn final_settings(params: &OutlineFitParams, scale: &SmoothnessScale) -> Settings {
     let last = OutlineFitParams { subsample: false, ..*params };
-    let settings = last.settings(params.iterations.max(1) + 2, scale);
+    let settings = last.settings_of(2, usize::MAX, scale);
     Settings { scale_px: params.cauchy_scale_px, judged: true, ..settings }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const SCALE: SmoothnessScale = SmoothnessScale { second: 1.0, third: 1.0 };
+
+    proptest! {
+        #[test]
+        fn thirds_of_the_iterations_have_settings_of_their_own(
+            iterations in 1..200usize,
+            iteration in 0..200usize,
+        ) {
+            let params = OutlineFitParams { iterations, ..OutlineFitParams::ANNEALED };
+            let settings = params.settings(iteration, &SCALE);
+            let third = 3 * iteration / iterations;
+            let expected = match third {
+                0 => params.lambda3_start,
+                1 => (params.lambda3_start * params.lambda3).sqrt(),
+                _ => params.lambda3,
+            };
+            prop_assert!((settings.lambda3 / expected - 1.0).abs() < 1e-12);
+            let reach = if third < 2 { params.reach_start_px } else { params.reach_px };
+            prop_assert_eq!(settings.reach_px, reach);
+        }
+    }
+
+    #[test]
+    fn as_many_iterations_as_it_takes_end_with_the_last_settings_too() {
+        let params = OutlineFitParams { iterations: usize::MAX, ..OutlineFitParams::ANNEALED };
+        assert!(params.validate().is_ok());
+        let last = final_settings(&params, &SCALE);
+        assert_eq!((last.lambda3, last.reach_px, last.stride), (0.3, 3.0, 1));
+        assert_eq!(params.settings(usize::MAX - 1, &SCALE), Settings { judged: false, ..last });
+        assert_eq!(params.settings(0, &SCALE).lambda3, 30.0);
+    }
+
+    #[test]
+    fn what_no_image_is_wide_enough_for_is_refused() {
+        let default = OutlineFitParams::DEFAULT;
+        for params in [
+            OutlineFitParams { reach_px: 1e20, ..default },
+            OutlineFitParams { reach_start_px: f64::MAX, ..default },
+            OutlineFitParams { cauchy_scale_px: 1e8, ..default },
+            OutlineFitParams { tolerance: f64::NAN, ..default },
+        ] {
+            assert!(matches!(params.validate(), Err(FitError::BadParameter { .. })));
+        }
+    }
 }

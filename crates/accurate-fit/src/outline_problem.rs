@@ -32,7 +32,7 @@ pub(crate) struct Settings {
     /// Smoothness, already in world units.
     pub(crate) lambda2: f64,
     pub(crate) lambda3: f64,
-    /// Weight of a curve sample outside the mask, per px of length.
+    /// Weight of a curve sample outside the mask, per px of length on average.
     pub(crate) outside_weight: f64,
     /// Whether nearest points are looked for as far as [`judge`](crate::judgement::judge) needs them,
     /// or only as far as they are data.
@@ -200,7 +200,8 @@ impl OutlineProblem<'_> {
         )
     }
 
-    /// Weight of a sample of one view's curve outside its mask.
+    /// Weight of a sample of one view's curve outside its mask. All weigh the same: by the length that each
+    /// has in its view, a hook seen from its front would be let go.
     fn outside_weight(&self, e: &Evaluation, view: usize, settings: &Settings) -> f64 {
         let chords = &e.chords[view];
         settings.outside_weight * chords.length_px() / (chords.points.len() - 1) as f64

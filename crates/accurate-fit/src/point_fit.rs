@@ -77,6 +77,14 @@ impl PointFitParams {
                 return Err(FitError::BadParameter { name, value });
             }
         }
+        for (name, value) in [
+            ("max_mean_distance_px", self.max_mean_distance_px),
+            ("min_coverage", self.min_coverage),
+        ] {
+            if !(value >= 0.0) {
+                return Err(FitError::BadParameter { name, value });
+            }
+        }
         self.calibration.map_or(Ok(()), |priors| priors.validate())
     }
 }
@@ -88,7 +96,7 @@ pub struct PointFit {
     pub curve: Curve3,
     /// Standard deviation of a point across the curve, px: known or estimated.
     pub noise_px: f64,
-    /// Root mean square of the residuals across the curve before and after, px.
+    /// Root mean square of the residuals across the curve, px: at the start curve and at the end.
     pub rms_px: [f64; 2],
     /// Parameter on [`PointFit::curve`] of every point of curve 1 and curve 2, never falling.
     pub parameters: [Vec<f64>; 2],
@@ -100,8 +108,9 @@ pub struct PointFit {
     pub coverage: f64,
     /// Levenberg-Marquardt steps that lowered the cost.
     pub steps: usize,
-    /// Mean of the squared residuals in units of their variance: about 1 where the curve explains the
-    /// points; 1 by construction where the noise was estimated.
+    /// Mean of the squared residuals in units of the noise's variance: about 1 where the curve explains
+    /// the points. Where the noise was estimated it says nothing: less than 1 by what the curve takes up,
+    /// and far less where the noise stands at its least.
     pub chi2_per_point: f64,
     /// -2 ln of the probability of the points (Laplace's approximation), up to a constant of the
     /// points: of several fits to the same points the one with the least is the likeliest, since a
@@ -159,11 +168,11 @@ pub fn fit_points(
     params.validate()?;
     let start = matched(curve1, curve2, pairs, rig, params)?;
     let mut fitter = Fitter::new(&start, rig, params)?;
+    let before = fitter.rms();
     let mut steps = 0;
     for _ in 0..params.first_steps {
         steps += usize::from(fitter.step()?);
     }
-    let before = fitter.rms();
     fitter.settings.window = WINDOWS_PX[1] / fitter.spacing_px;
     let mut relaxation = 2.0;
     for _ in 0..params.rounds {

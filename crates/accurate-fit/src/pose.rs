@@ -64,7 +64,7 @@ pub(crate) fn respaced(
     projectors: &[Projector; 2],
     knot_spacing_px: f64,
 ) -> Result<(UniformSpline, f64), FitError> {
-    let points = dense_points(curve);
+    let points = dense_points(curve, 0);
     let px_per_unit = px_per_unit(&points, projectors)?;
     let length: f64 = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
     let spans = spans_for(length * px_per_unit, knot_spacing_px)?;
@@ -74,8 +74,13 @@ pub(crate) fn respaced(
             return Ok((same, px_per_unit));
         }
     }
+    // A curve of few knots is long between them.
+    let points = dense_points(curve, POINTS_PER_SPAN * spans);
     Ok((UniformSpline::through(&points, spans)?, px_per_unit))
 }
+
+/// Points that a spline is drawn through for each of its spans, at least.
+pub(crate) const POINTS_PER_SPAN: usize = 4;
 
 /// Number of spans for a curve of `length_px`.
 pub(crate) fn spans_for(length_px: f64, knot_spacing_px: f64) -> Result<usize, FitError> {
@@ -99,4 +104,37 @@ pub(crate) fn px_per_unit(points: &[Point3], projectors: &[Projector; 2]) -> Res
         }
     }
     Ok(sum / (2 * points.len().max(1)) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::nalgebra::{Matrix3, Rotation3, Vector3};
+    use accurate_geom::{Camera, ImageSize, LengthUnit};
+
+    use super::*;
+
+    /// A straight wire given by its four control points, a thousand units from the origin, is the same wire
+    /// with 250 spans: damping must not draw to the origin what no point holds.
+    #[test]
+    fn a_curve_of_few_knots_stays_where_it_is() {
+        let k = Matrix3::new(1000.0, 0.0, 256.0, 0.0, 1000.0, 256.0, 0.0, 0.0, 1.0);
+        let size = ImageSize { width: 512, height: 512 };
+        let one = Camera::new(k, Matrix3::identity(), Vector3::zeros(), size).unwrap();
+        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), 0.6).into_inner();
+        let back = Vector3::new(0.0, 0.0, 1000.0);
+        let two = Camera::new(k, turn, back - turn * back, size).unwrap();
+        let rig = Rig::new(one, two, LengthUnit::Millimetre).unwrap();
+        let points =
+            [-250.0, -80.0, 90.0, 250.0].map(|x| Point3::new(x, 0.3 * x, 1000.0 + 0.1 * x));
+        let curve = Curve3::interpolate(&points).unwrap();
+        let (spline, px_per_unit) = respaced(&curve, &Projector::pair(&rig), 2.0).unwrap();
+        assert!(spline.spans() > 200);
+        for k in 0..=1000 {
+            let u = spline.spans() as f64 * f64::from(k) / 1000.0;
+            let off = curve.closest(&Point3::from(spline.point(u))).distance * px_per_unit;
+            assert!(off < 1e-3, "{off} px at {u}");
+        }
+        let end = (spline.point(0.0) - points[0].coords).norm() * px_per_unit;
+        assert!(end < 1e-2, "{end} px");
+    }
 }

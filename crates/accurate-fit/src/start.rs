@@ -1,4 +1,4 @@
-use accurate_geom::{Curve3, Point3};
+use accurate_geom::{Curve3, GeomError, Point3};
 
 use crate::FitError;
 use crate::curve::to_curve;
@@ -8,14 +8,15 @@ use crate::uniform_spline::UniformSpline;
 /// The smooth curve from which a fit starts: a penalised least-squares spline through matched and
 /// triangulated points.
 ///
-/// `arc_px` is the place of each point along the body, px, never falling: the mean arc length of
+/// `arc_px` is the place of each point along the body, px, one a point, never falling: the mean arc length of
 /// both views is steadier than the chords of noisy points. Knots are `knot_spacing_px` apart;
 /// second and third differences of the control points are weighed like one point each, which
 /// carries the curve over stretches where the points scatter in depth.
 ///
 /// # Errors
 /// [`FitError::TooFewPoints`] for fewer than 4 points, [`FitError::NotFinite`],
-/// [`FitError::BadLength`] for a body without length, [`FitError::BadParameter`].
+/// [`FitError::BadLength`] for a body without length, [`FitError::BadParameter`], also for arc lengths that
+/// fall; [`FitError::Geometry`] if their number is not that of the points.
 ///
 /// # Cost
 /// O(points).
@@ -25,8 +26,12 @@ pub fn start_curve(
     knot_spacing_px: f64,
 ) -> Result<Curve3, FitError> {
     let needed = 4;
-    let found = points.len().min(arc_px.len());
-    if found < needed || points.len() != arc_px.len() {
+    let found = points.len();
+    if arc_px.len() != found {
+        let (what, expected) = ("arc lengths of a start curve", found);
+        return Err(GeomError::LengthMismatch { what, expected, found: arc_px.len() }.into());
+    }
+    if found < needed {
         return Err(FitError::TooFewPoints { what: "points of a start curve", found, needed });
     }
     if !(knot_spacing_px > 0.0 && knot_spacing_px.is_finite()) {
@@ -36,18 +41,15 @@ pub fn start_curve(
     if let Some(index) = points.iter().zip(arc_px).position(bad) {
         return Err(FitError::NotFinite { what: "point of a start curve", index });
     }
+    if let Some(pair) = arc_px.windows(2).find(|pair| pair[1] < pair[0]) {
+        return Err(FitError::BadParameter { name: "arc_px", value: pair[1] });
+    }
     let (first, last) = (arc_px[0], arc_px[found - 1]);
     let spans = spans_for(last - first, knot_spacing_px)?;
     let to_u = spans as f64 / (last - first);
-    // Relative to the middle, so that nothing is lost of points far from the origin.
-    let centre = points.iter().map(|p| p.coords).sum::<accurate_geom::nalgebra::Vector3<f64>>()
-        / found as f64;
-    let data = points.iter().zip(arc_px).map(|(p, s)| ((s - first) * to_u, p.coords - centre));
-    let mut spline = UniformSpline::least_squares(spans, data, 1.0, 1.0)?;
-    for control in &mut spline.control {
-        *control += centre;
-    }
-    to_curve(&spline)
+    let data: Vec<_> =
+        points.iter().zip(arc_px).map(|(p, s)| ((s - first) * to_u, p.coords)).collect();
+    to_curve(&UniformSpline::least_squares(spans, &data, 1.0, 1.0)?)
 }
 
 #[cfg(test)]
@@ -81,6 +83,14 @@ mod tests {
             Err(FitError::TooFewPoints { .. })
         ));
         assert!(matches!(start_curve(&[p; 4], &[5.0; 4], 10.0), Err(FitError::BadLength { .. })));
+        assert!(matches!(
+            start_curve(&[p; 5], &[5.0; 4], 10.0),
+            Err(FitError::Geometry(GeomError::LengthMismatch { expected: 5, found: 4, .. }))
+        ));
+        assert!(matches!(
+            start_curve(&[p; 4], &[0.0, 50.0, 20.0, 100.0], 10.0),
+            Err(FitError::BadParameter { name: "arc_px", .. })
+        ));
         let nan = Point3::new(f64::NAN, 0.0, 0.0);
         assert!(matches!(
             start_curve(&[p, p, nan, p], &[0.0, 5.0, 9.0, 20.0], 10.0),

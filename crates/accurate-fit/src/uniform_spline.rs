@@ -119,15 +119,17 @@ impl UniformSpline {
     /// and third differences of the control points penalised.
     pub(crate) fn least_squares(
         spans: usize,
-        data: impl Iterator<Item = (f64, Vector3<f64>)>,
+        data: &[(f64, Vector3<f64>)],
         lambda2: f64,
         lambda3: f64,
     ) -> Result<Self, FitError> {
         let n = spans + 3;
+        // Relative to the middle: damping draws to the origin, and nothing is lost of points far from it.
+        let centre = data.iter().map(|(_, point)| point).sum::<Vector3<f64>>() / data.len() as f64;
         let mut spline = Self { control: vec![Vector3::zeros(); n] };
         let mut normal = NormalEquations::new(n, 0)?;
         for (u, point) in data {
-            let (span, t) = spline.locate(u);
+            let (span, t) = spline.locate(*u);
             let weights = basis(t);
             for axis in 0..3 {
                 let mut gradient = [0.0; 3];
@@ -137,7 +139,7 @@ impl UniformSpline {
                     basis: &weights,
                     gradient: &gradient,
                     global: &[],
-                    residual: -point[axis],
+                    residual: centre[axis] - point[axis],
                     weight: 1.0,
                 };
                 normal.add(Scalar::new(), &row);
@@ -146,6 +148,7 @@ impl UniformSpline {
         normal.add_smoothness(&spline.control, lambda2, lambda3, &[]);
         let step = normal.solve(1e-9)?;
         spline.add(step);
+        spline.control.iter_mut().for_each(|control| *control += centre);
         Ok(spline)
     }
 
@@ -171,8 +174,8 @@ impl UniformSpline {
         }
         let to_u = spans as f64 / length;
         // Only ties the control points that no datum reaches.
-        let data = arc.iter().zip(points).map(|(s, p)| (s * to_u, p.coords));
-        Self::least_squares(spans, data, 0.0, 1e-6)
+        let data: Vec<_> = arc.iter().zip(points).map(|(s, p)| (s * to_u, p.coords)).collect();
+        Self::least_squares(spans, &data, 0.0, 1e-6)
     }
 }
 
@@ -213,11 +216,9 @@ mod tests {
                 control: control.iter().map(|&(x, y, z)| Vector3::new(x, y, z)).collect(),
             };
             let n = 12 * truth.spans();
-            let data = (0..=n).map(|k| {
-                let u = k as f64 * truth.spans() as f64 / n as f64;
-                (u, truth.point(u))
-            });
-            let found = UniformSpline::least_squares(truth.spans(), data, 0.0, 0.0).unwrap();
+            let at = |k: usize| k as f64 * truth.spans() as f64 / n as f64;
+            let data: Vec<_> = (0..=n).map(|k| (at(k), truth.point(at(k)))).collect();
+            let found = UniformSpline::least_squares(truth.spans(), &data, 0.0, 0.0).unwrap();
             for (a, b) in found.control.iter().zip(&truth.control) {
                 // Damping 1e-9 relative to the diagonal, times the condition of a cubic basis
                 // (< 1e4 with 12 points in the only span), times 100.

@@ -8,7 +8,7 @@ use accurate_fit::{
     fit_outlines_adaptively, fit_outlines_and_calibration,
 };
 use accurate_geom::nalgebra::{Matrix3, Vector2};
-use accurate_geom::{Camera, Rig, View1, View2};
+use accurate_geom::{Camera, Distortion, Rig, View1, View2};
 use accurate_synth::{CalibrationError, CaseOptions, Family, SynthCase, generate};
 use support::{curve_through, deviation, px_per_unit};
 
@@ -74,7 +74,10 @@ fn a_shift_across_epipolar_lines_is_found_and_removed() {
         k[(0, 2)] += 0.8 * across.x;
         k[(1, 2)] += 0.8 * across.y;
         let c = case.rig.camera2();
+        // Pixels are undistorted, but their camera knows its lens.
+        let lens = Distortion { k1: 0.01, ..Distortion::default() };
         let camera2 = Camera::new(k, *c.r(), *c.t(), c.size()).unwrap();
+        let camera2 = camera2.with_distortion(lens).unwrap();
         let nominal = Rig::new(case.rig.camera1().clone(), camera2, case.rig.unit()).unwrap();
         let found = fitted(&case, &nominal);
         let estimate = Vector2::from(found.calibration.shift_px).dot(&across);
@@ -83,6 +86,7 @@ fn a_shift_across_epipolar_lines_is_found_and_removed() {
         assert!((estimate + 0.8).abs() < 4.0 * sigma, "{} {estimate} {sigma}", case.id);
         // Up to that the corrected rig is the true one again, and the curve explains the outlines.
         let corrected = found.calibration.correct(&nominal).unwrap();
+        assert_eq!(corrected.camera2().distortion(), Some(&lens));
         let dk = corrected.camera2().k() - c.k();
         assert!(across.dot(&Vector2::new(dk[(0, 2)], dk[(1, 2)])).abs() < 4.0 * sigma);
         assert!(found.fit.judgement.unexplained < 0.1, "{:?}", found.fit.judgement);

@@ -129,6 +129,8 @@ fn pictures_tell_a_curve_that_runs_back_over_itself_from_the_body() {
         "{:?}",
         pair.fit(&behind)
     );
+    let alone = IntensityPair::around(&[&behind], &images, &case.rig, &params, None);
+    assert!(matches!(alone, Err(FitError::NotInFront { .. })), "{alone:?}");
     let (whole, folded) = (pair.fit(&whole).unwrap(), pair.fit(&folded).unwrap());
     // Twice the darkness along 25 px, over a width of 3 px, in both views, however the amplitude shares it:
     // at Cauchy's scale of 3 noises a pixel so far off costs 4.5 ln 2 at least.
@@ -156,7 +158,12 @@ fn what_shows_no_body_is_refused() {
     let mut broken = first.clone();
     broken[(3, 4)] = f32::NAN;
     assert_eq!(outcome([broken, second.clone()]), not_seen(1));
-    let params = IntensityFitParams { lambda3: f64::NAN, ..IntensityFitParams::DEFAULT };
-    let refused = fit_intensities(&curve, &images, &case.rig, &params, None).map(|_| ());
-    assert!(matches!(refused, Err(FitError::BadParameter { name: "lambda3", .. })), "{refused:?}");
+    let default = IntensityFitParams::DEFAULT;
+    for params in [
+        IntensityFitParams { lambda3: f64::NAN, ..default },
+        IntensityFitParams { tolerance: f64::NAN, ..default },
+    ] {
+        let refused = fit_intensities(&curve, &images, &case.rig, &params, None).map(|_| ());
+        assert!(matches!(refused, Err(FitError::BadParameter { .. })), "{refused:?}");
+    }
 }

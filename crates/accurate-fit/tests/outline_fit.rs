@@ -291,6 +291,14 @@ fn what_cannot_be_fitted_is_refused() {
         fit_outlines(&truth, &pair, rig, &bad),
         Err(FitError::BadParameter { name: "lambda3", .. })
     ));
+    for bad in [
+        AdaptiveParams { max_unexplained: f64::NAN, ..AdaptiveParams::DEFAULT },
+        AdaptiveParams { min_knot_spacing_px: f64::NAN, ..AdaptiveParams::DEFAULT },
+    ] {
+        let settings = &OutlineFitParams::DEFAULT;
+        let refused = fit_outlines_adaptively(&truth, &pair, rig, settings, &bad);
+        assert!(matches!(refused, Err(FitError::BadParameter { .. })));
+    }
     let away: Vec<Point3> = s
         .case
         .truth

@@ -210,11 +210,16 @@ fn a_wrong_match_is_refused_with_its_numbers() {
         fit_points(&broken, two, &crossed, &case.rig, &params),
         Err(FitError::NotFinite { index: 7, .. })
     ));
-    let bad = PointFitParams { huber_sigmas: 0.0, ..params };
-    assert!(matches!(
-        fit_points(one, two, &crossed, &case.rig, &bad),
-        Err(FitError::BadParameter { name: "huber_sigmas", .. })
-    ));
+    for bad in [
+        PointFitParams { huber_sigmas: 0.0, ..params },
+        PointFitParams { max_mean_distance_px: f64::NAN, ..params },
+        PointFitParams { min_coverage: f64::NAN, ..params },
+    ] {
+        assert!(matches!(
+            fit_points(one, two, &crossed, &case.rig, &bad),
+            Err(FitError::BadParameter { .. })
+        ));
+    }
 }
 
 #[test]

@@ -136,8 +136,8 @@ pub struct OutlineDiagnostics {
     /// [`Judgement::unexplained`]: accurate_fit::Judgement::unexplained
     pub unexplained: f64,
     /// Curve that the masks do not show, as [`Judgement::outside`]: its distance from them beyond 1 px,
-    /// at most 4 px, summed over both images in steps of 1 px and divided by 10 px. 0 at the truth; no
-    /// fraction either.
+    /// at most 4 px, summed over both images in steps that are 1 px long on average and divided by 10 px.
+    /// 0 at the truth; no fraction either.
     ///
     /// [`Judgement::outside`]: accurate_fit::Judgement::outside
     pub outside: f64,

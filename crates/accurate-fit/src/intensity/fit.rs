@@ -7,7 +7,7 @@ use super::dense_normal::DenseNormal;
 use super::drawing::{Drawing, SAMPLES_PER_PX, radius_px};
 use crate::curve::{dense_points, to_curve};
 use crate::outline_problem::smoothness;
-use crate::pose::{px_per_unit, spans_for};
+use crate::pose::{POINTS_PER_SPAN, px_per_unit, spans_for};
 use crate::projector::{Nuisance, Projector};
 use crate::uniform_spline::UniformSpline;
 use crate::{CalibrationEstimate, CalibrationPriors, CurveCovariance, FitError};
@@ -81,6 +81,9 @@ impl IntensityFitParams {
         if !(0.0..1e3).contains(&self.extension_px) {
             let value = self.extension_px;
             return Err(FitError::BadParameter { name: "extension_px", value });
+        }
+        if !(self.tolerance >= 0.0) {
+            return Err(FitError::BadParameter { name: "tolerance", value: self.tolerance });
         }
         Ok(())
     }
@@ -160,7 +163,7 @@ pub struct IntensityPair {
 
 impl IntensityPair {
     /// The pixels near any of the curves; parameters as of [`fit_intensities`]. What is no usable start
-    /// is passed over here and refused by [`IntensityPair::fit`].
+    /// is passed over here, unless it is the only one, and refused by [`IntensityPair::fit`].
     ///
     /// # Errors
     /// As [`fit_intensities`].
@@ -180,11 +183,19 @@ impl IntensityPair {
             .map_or(Nuisance::default(), |(_, [x, y, roll])| Nuisance { shift_px: [x, y], roll });
         projectors[1].set_nuisance(nuisance);
         let mut points = [Vec::new(), Vec::new()];
+        let mut refused = None;
         for curve in curves {
-            let Ok(start) = Start::new(curve, &projectors, params) else { continue };
-            for (points, projector) in points.iter_mut().zip(&projectors) {
-                points.extend(shown(&start.spline, start.samples, projector));
+            match Start::new(curve, &projectors, params) {
+                Ok(start) => {
+                    for (points, projector) in points.iter_mut().zip(&projectors) {
+                        points.extend(shown(&start.spline, start.samples, projector));
+                    }
+                }
+                Err(error) => refused = refused.or(Some(error)),
             }
+        }
+        if let Some(error) = refused.filter(|_| points[0].is_empty()) {
+            return Err(error);
         }
         let bands = [
             Band::new(&images[0], &points[0], 1, params)?,
@@ -243,15 +254,18 @@ impl Start {
         projectors: &[Projector; 2],
         params: &IntensityFitParams,
     ) -> Result<Self, FitError> {
-        let given = dense_points(curve);
+        let given = dense_points(curve, 0);
         let scale = px_per_unit(&given, projectors)?;
-        let points = continued(&given, params.extension_px / scale, DIRECTION_PX / scale);
-        let length_px = points.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>() * scale;
+        let longer =
+            |points: &[_]| continued(points, params.extension_px / scale, DIRECTION_PX / scale);
+        let length: f64 = longer(&given).windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+        let length_px = scale * length;
         let spans = spans_for(length_px, params.knot_spacing_px)?.max(5);
         if spans > MOST_SPANS {
             return Err(FitError::BadLength { length_px });
         }
-        let spline = UniformSpline::through(&points, spans)?;
+        let given = dense_points(curve, POINTS_PER_SPAN * spans);
+        let spline = UniformSpline::through(&longer(&given), spans)?;
         let samples = (length_px * SAMPLES_PER_PX).ceil() as usize;
         Ok(Self { given, spline, samples, scale })
     }
@@ -475,12 +489,9 @@ fn without_ends(line: &Polyline2) -> &[Point2] {
     &line.points()[first.min(end)..end]
 }
 
-/// Largest distance of a point from the nearest point of a line.
+/// Largest distance of a point from a line.
 fn farthest(points: &[Point2], line: &Polyline2) -> f64 {
-    let nearest = |p: &Point2| {
-        line.points().iter().map(|o| (p - o).norm_squared()).fold(f64::INFINITY, f64::min)
-    };
-    points.iter().map(nearest).fold(0.0, f64::max).sqrt()
+    points.iter().map(|p| line.closest(p).distance).fold(0.0, f64::max)
 }
 
 /// The points, continued straight at both ends by `by`, in the direction of the last `over`.
@@ -496,4 +507,17 @@ fn continued(points: &[Point3], by: f64, over: f64) -> Vec<Point3> {
     all.extend_from_slice(points);
     all.extend(beyond(points.last(), reversed.iter()));
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_on_a_line_between_its_vertices_has_not_moved() {
+        let line = Polyline2::new(vec![Point2::new(0.0, 0.0), Point2::new(100.0, 0.0)]).unwrap();
+        let points = [20.0, 50.0, 77.0].map(|x| Point2::new(x, 0.0));
+        assert_eq!(farthest(&points, &line), 0.0);
+        assert_eq!(farthest(&[Point2::new(40.0, 3.0), points[0]], &line), 3.0);
+    }
 }
