@@ -211,7 +211,7 @@ fn check(command: &Command, table: &Table, path: &str) -> Result<(), String> {
                 .chain(subcommands(command).map(|c| c.get_name().to_owned()));
             let near = names
                 .map(|n| (strsim::jaro_winkler(&n, key), n))
-                .filter(|(likeness, _)| *likeness > 0.8)
+                .filter(|(likeness, n)| *likeness > 0.8 && n != key)
                 .max_by(|a, b| a.0.total_cmp(&b.0));
             let suggestion =
                 near.map(|(_, n)| format!("; did you mean `{n}`?")).unwrap_or_default();

@@ -99,6 +99,16 @@ impl fmt::Display for Failure {
     }
 }
 
+const LOOK_AT_THE_MASK: &str =
+    "look at the mask: the body should be non-zero and at least 2 px long";
+
+/// Whether a file is one that a pair folder holds.
+fn is_of_a_pair(path: &Path) -> bool {
+    const FOLDERS: [&str; 5] = ["calibration", "points", "masks", "images", "annotations"];
+    let above = path.parent().and_then(Path::file_name);
+    path.ends_with("meta.json") || FOLDERS.iter().any(|name| above.is_some_and(|f| f == *name))
+}
+
 /// For views that do not go together.
 const ASK_THE_DOCTOR: &str = "`accurate camera doctor` tries the usual mistakes (swapped views, inverse extrinsics, mirrored \
      images, units, lenses) and names the one";
@@ -106,8 +116,12 @@ const ASK_THE_DOCTOR: &str = "`accurate camera doctor` tries the usual mistakes 
 impl From<IoError> for Failure {
     fn from(error: IoError) -> Self {
         let (code, hint) = match &error {
-            IoError::Missing { .. } => {
+            IoError::Missing { path, .. } if is_of_a_pair(path) => {
                 (Self::NO_INPUT, Some("a pair folder's layout is in docs/conventions.md"))
+            }
+            IoError::Missing { .. } => (Self::NO_INPUT, None),
+            IoError::Empty { what: "foreground pixel", .. } => {
+                (Code::BadMask, Some(LOOK_AT_THE_MASK))
             }
             IoError::NoPair { .. } => {
                 (Code::NoPair, Some("give a pair folder, or a folder of case_* pair folders"))
@@ -156,12 +170,14 @@ impl From<Error> for Failure {
             Error::Segmentation { source, .. } => {
                 let failure = Self::new(code_of(&source), message);
                 match code_of(&source) {
-                    Code::BadMask => failure.with_hint(
-                        "look at the mask: the body should be non-zero and at least 2 px long",
-                    ),
+                    Code::BadMask => failure.with_hint(LOOK_AT_THE_MASK),
                     _ => failure,
                 }
             }
+            Error::Traversal {
+                source: TraverseError::Empty { .. } | TraverseError::TooSmall { .. },
+                ..
+            } => Self::new(Code::BadMask, message).with_hint(LOOK_AT_THE_MASK),
             Error::Traversal { .. } => Self::new(Code::NoOrder, message)
                 .with_hint("order the points yourself and use --input points"),
             Error::Matching { .. } => Self::new(Code::NoMatch, message).with_hint(ASK_THE_DOCTOR),
@@ -172,6 +188,8 @@ impl From<Error> for Failure {
             }
             Error::Fitting { .. } => Self::new(Code::NoFit, message),
             Error::Name(_) => Self::new(Self::BAD_INPUT, message),
+            Error::MixedUnits { .. } => Self::new(Self::BAD_INPUT, message)
+                .with_hint("measure pairs in one unit at a time: `unit` in meta.json says which"),
             Error::Synthesis(_) => Self::new(Self::USAGE, message),
             _ => Self::new(Self::INTERNAL, message),
         }

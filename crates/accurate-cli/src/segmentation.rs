@@ -140,6 +140,7 @@ pub fn code_of(error: &SegError) -> Code {
     match error {
         SegError::TooLarge { .. } => Code::TooLarge,
         SegError::NotFinite { .. } => Code::NotFinite,
+        SegError::NotAProbability { .. } => Code::BadInput,
         SegError::LevelIsNan { .. }
         | SegError::LevelOutOfRange { .. }
         | SegError::LevelsOutOfOrder { .. } => Code::Usage,

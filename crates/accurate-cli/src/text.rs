@@ -1,7 +1,8 @@
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use accurate3d::io::write_atomically;
 
+use crate::code::Code;
 use crate::failure::Failure;
 
 /// Reads a text file whole.
@@ -9,6 +10,7 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
     std::fs::read_to_string(path).map_err(|error| {
         let code = match error.kind() {
             std::io::ErrorKind::NotFound => Failure::NO_INPUT,
+            std::io::ErrorKind::InvalidData => Code::Malformed,
             _ => Failure::IO,
         };
         Failure::new(code, format!("{}: {error}", path.display()))
@@ -47,6 +49,21 @@ pub fn check_folder(path: &Path) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
+}
+
+/// Refuses an output file that is one of those `read`.
+///
+/// # Errors
+/// [`Failure::USAGE`].
+pub fn refuse_what_is_read(written: &Path, read: &[PathBuf]) -> Result<(), Failure> {
+    let Ok(written_to) = written.canonicalize() else { return Ok(()) };
+    if read.iter().any(|path| path.canonicalize().is_ok_and(|path| path == written_to)) {
+        let message = format!("{} is read, and would be replaced", written.display());
+        return Err(
+            Failure::new(Failure::USAGE, message).with_hint("give another place for the results")
+        );
+    }
+    Ok(())
 }
 
 /// Checks a place for an output file and makes its folder: what fails, fails before the work.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use accurate3d::InputKind;
+use accurate3d::geom::Camera;
 use accurate3d::io::{
     FrameChoice, NamedView, Pair, PairParts, ViewDefaults, ViewFiles, is_dicom, pair_files,
     pair_of_views, read_cameras, read_curve, read_grey,
@@ -10,6 +11,7 @@ use accurate3d::io::{
 use ndarray::Array2;
 
 use crate::args::{ReconstructArgs, ViewArgs};
+use crate::code::Code;
 use crate::dicom_child;
 use crate::failure::Failure;
 use crate::units::common_unit;
@@ -47,10 +49,24 @@ pub fn two_cameras(
         [] => views.clone(),
         wanted => wanted.iter().map(|name| named(&views, name)).collect::<Result<_, _>>()?,
     };
+    if let [one, two] = wanted
+        && one == two
+    {
+        let message = format!("--views names `{one}` twice");
+        return Err(Failure::new(Failure::USAGE, message)
+            .with_hint(format!("there are: {}", names(&views))));
+    }
     <[NamedView; 2]>::try_from(chosen).map_err(|chosen| {
         Failure::new(
             Failure::USAGE,
-            format!("two cameras are needed, but there are {}: {}", chosen.len(), names(&views)),
+            match wanted {
+                [] => format!(
+                    "two cameras are needed, but there are {}: {}",
+                    chosen.len(),
+                    names(&views)
+                ),
+                wanted => format!("--views names {}; expected two", wanted.len()),
+            },
         )
         .with_hint("repeat --cameras for more files; choose among more with --views NAME,NAME")
     })
@@ -76,6 +92,26 @@ fn names(views: &[NamedView]) -> String {
     views.iter().map(|view| view.name.as_str()).collect::<Vec<_>>().join(", ")
 }
 
+/// Refuses a mask, rows and columns, of another size than its camera's image.
+pub fn refuse_other_size(
+    path: &Path,
+    (rows, columns): (usize, usize),
+    camera: &Camera,
+) -> Result<(), Failure> {
+    let size = camera.size();
+    if (columns, rows) == (size.width as usize, size.height as usize) {
+        return Ok(());
+    }
+    let message = format!(
+        "{}: {columns} x {rows} pixels, but its camera's image is {} x {}",
+        path.display(),
+        size.width,
+        size.height
+    );
+    Err(Failure::new(Code::SizeMismatch, message)
+        .with_hint("masks and images must have the size the cameras are for"))
+}
+
 /// Whether the inputs are the files of two views rather than pair folders.
 pub fn are_files(args: &ReconstructArgs) -> bool {
     !args.views.cameras.is_empty() || args.inputs.iter().any(|input| input.is_file())
@@ -84,18 +120,22 @@ pub fn are_files(args: &ReconstructArgs) -> bool {
 /// Two views given as files, as a pair; the files it came from, cameras first.
 pub fn pair_of_files(args: &ReconstructArgs) -> Result<(Pair, Vec<PathBuf>), Failure> {
     let usage = |what: String| Failure::new(Failure::USAGE, what);
+    if let Some(folder) = args.inputs.iter().find(|input| input.is_dir()) {
+        let file = args.inputs.iter().find(|input| input.is_file());
+        let (folder, file) = (folder.display(), file.map(|file| file.display()));
+        return Err(match (file, args.views.cameras.is_empty()) {
+            (Some(file), true) => {
+                usage(format!("{file} is no pair folder, but {folder} is a folder"))
+                    .with_hint("give pair folders only, or two files, one of each view")
+            }
+            _ => usage(format!("{folder} is a folder, not the file of a view"))
+                .with_hint("a pair folder has its own cameras: leave --cameras out, or give files"),
+        });
+    }
     let [one, two] = args.inputs.as_slice() else {
         let message = format!("{} files; expected two, one of each view", args.inputs.len());
         return Err(usage(message).with_hint("view 1 first; several pairs need pair folders"));
     };
-    for input in [one, two] {
-        if input.is_dir() {
-            let message = format!("{} is a folder, not the file of a view", input.display());
-            return Err(usage(message).with_hint(
-                "a pair folder has its own cameras: leave --cameras out, or give files",
-            ));
-        }
-    }
     let dicom = [is_dicom(one)?, is_dicom(two)?];
     if args.views.cameras.is_empty() && dicom != [true; 2] {
         let other = if dicom[0] { two } else { one };
@@ -150,7 +190,7 @@ pub fn pair_of_files(args: &ReconstructArgs) -> Result<(Pair, Vec<PathBuf>), Fai
 }
 
 /// The files that cameras named by one path are read from.
-fn files_behind(path: &Path) -> Vec<PathBuf> {
+pub fn files_behind(path: &Path) -> Vec<PathBuf> {
     // COLMAP's two files may be named by their folder or by one of them.
     const COLMAP: [&str; 2] = ["cameras.txt", "images.txt"];
     let is_one = COLMAP.iter().any(|name| path.file_name().is_some_and(|file| file == *name));

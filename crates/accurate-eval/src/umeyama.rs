@@ -1,5 +1,5 @@
 use accurate_geom::Point3;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use crate::{EvalError, check};
 
@@ -107,10 +107,12 @@ fn align(
         covariance += t * s.transpose() * *w;
         source_variance += s.norm_squared() * w;
     }
-    let svd = covariance.svd(true, true);
-    let singular = svd.singular_values;
+    // Not that of a 3 x 3 matrix, which goes by the square of the matrix and of small ratios leaves noise.
+    let svd = DMatrix::from_column_slice(3, 3, covariance.as_slice()).svd(true, true);
+    let singular = Vector3::from_column_slice(svd.singular_values.as_slice());
     let spread_ratio = if singular[0] > 0.0 { (singular[1] / singular[0]).sqrt() } else { 0.0 };
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return collinear(spread_ratio) };
+    let [u, v_t] = [u, v_t].map(|m| Matrix3::from_column_slice(m.as_slice()));
     if spread_ratio < LEAST_SPREAD_RATIO {
         return collinear(spread_ratio);
     }

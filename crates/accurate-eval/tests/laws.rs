@@ -207,6 +207,23 @@ proptest! {
         prop_assert!((transform.apply(&point) - target[0]).norm() <= 4.0 * error);
     }
 
+    /// A bow so flat that it is almost a line, down to where rounding decides.
+    #[test]
+    fn umeyama_recovers_the_motion_of_a_nearly_straight_wire(
+        rotation in rotations(), log_bow in -5.0..0.0_f64,
+    ) {
+        let bow = 10f64.powf(log_bow);
+        let place = |x: f64| Point3::new(x, bow * (x * x / 50.0 - 17.0), 0.0);
+        let source: Vec<_> = (-50..=50).map(|x| place(f64::from(x))).collect();
+        let target: Vec<_> = source.iter().map(|p| rotation * p).collect();
+        let found = align_rigid(&source, &target, None).unwrap();
+        // As above: coordinates below 90, amplified by the inverse squared spread ratio.
+        let error = 40.0 * 8.0 * f64::EPSILON * 90.0 / found.spread_ratio.powi(2);
+        let turned = (found.target_from_source.rotation - rotation.matrix()).norm();
+        prop_assert!(turned <= error, "{turned} {error} at {}", found.spread_ratio);
+        prop_assert!(found.rms <= error, "{} {error}", found.rms);
+    }
+
     #[test]
     fn no_rigid_motion_near_the_fitted_one_is_better(
         source in curves(4..20), noise in curves(20..21), rotation in rotations(),

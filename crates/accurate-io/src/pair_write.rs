@@ -7,12 +7,12 @@ use ndarray::Array2;
 
 use crate::IoError;
 use crate::calibration::{VIEWS, rt_path};
+use crate::curve::{CurveTable, write_curve};
 use crate::image_file::{BitDepth, GreyImage, write_grey, write_mask};
 use crate::json::write_json;
 use crate::matrix::{write_matrix3, write_matrix3x4};
 use crate::meta::{Meta, check_case_id};
 use crate::pair::{OrderedPoints, Pair, TRUTH_NAME, image_name, mask_name, points_name};
-use crate::ply::{PlyEncoding, write_ply_points};
 use crate::points::{check_points, write_points};
 
 /// What [`write_pair`] puts into a folder. Sizes and unit are the rig's.
@@ -97,7 +97,8 @@ pub fn write_pair(dir: &Path, contents: &PairContents) -> Result<(), IoError> {
     }
     if let Some(truth) = &contents.truth {
         make("annotations")?;
-        write_ply_points(&dir.join(TRUTH_NAME), truth, PlyEncoding::BinaryLittleEndian)?;
+        let truth = CurveTable::from_points(truth.clone(), contents.rig.unit());
+        write_curve(&dir.join(TRUTH_NAME), &truth)?;
     }
     let num_points = match (&contents.truth, &contents.points) {
         (Some(truth), _) => Some(truth.len()),

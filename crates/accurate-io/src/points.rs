@@ -8,8 +8,8 @@ use crate::bounded::{MAX_POINTS_BYTES, read_bytes};
 use crate::matrix::{finite, parse_number};
 
 /// Reads ordered centreline points (`points_L.csv`) of view `V`: a header with the columns `x` and
-/// `y` in px, then one point per line, in order. Other columns are ignored. Points may lie outside
-/// the image.
+/// `y` in px, then one point per line, in order. Other columns are ignored, but with a column `z` it is a curve
+/// in space and refused. Points may lie outside the image.
 ///
 /// # Errors
 /// [`IoError::NotANumber`] or [`IoError::NotFinite`] with line and column; [`IoError::Malformed`]
@@ -18,6 +18,10 @@ use crate::matrix::{finite, parse_number};
 pub fn read_points<V: View>(path: &Path) -> Result<Vec<Pixel<V>>, IoError> {
     let table = CsvTable::read(path)?;
     let (x, y) = (table.column("x")?, table.column("y")?);
+    if table.header.iter().any(|name| name == "z") {
+        let reason = "a column `z`: this is a curve in space, not points of an image";
+        return Err(IoError::malformed(path, "points", Some(1), reason));
+    }
     let mut points = Vec::new();
     table.for_each_row(|line, row| {
         let number = |c: usize| parse_number(path, line, c + 1, row.get(c).unwrap_or_default());

@@ -208,7 +208,7 @@ impl FreeMatcher {
             let fill = |i: usize, row: &mut [f64]| costs.fill_row(i, row);
             align_free(n1, n2, fill, &params.prices, &ends)?
         };
-        let path = trim_end_runs(&found.path, &costs, &ends, params.end_run_px);
+        let path = trim_end_runs(&found.path, &costs, [free1, free2], params.end_run_px);
         let mean_cost_px = found.total_cost / (n1 + n2) as f64;
         Ok(Candidate { costs, path, reversed, first2: 0, closed: false, mean_cost_px })
     }
@@ -424,22 +424,24 @@ fn samples_within<V: View>(curve: &[Pixel<V>], free: FreeEnds) -> (usize, usize)
     if curve.is_empty() {
         return (0, 0); // refused by the cost model
     }
+    // Of an end that is seen no point is left out, not even one that stands twice.
+    let at_most = |px: f64, samples: usize| if px > 0.0 { samples } else { 0 };
     let lengths = cumulative_lengths(curve);
     let whole = lengths[lengths.len() - 1];
     let begin = lengths.partition_point(|l| *l <= free.begin_px);
     let end = lengths.len() - lengths.partition_point(|l| whole - *l > free.end_px);
-    (begin.saturating_sub(1), end.saturating_sub(1))
+    (at_most(free.begin_px, begin.saturating_sub(1)), at_most(free.end_px, end.saturating_sub(1)))
 }
 
 /// Where a path that may end earlier ends with one view standing still, at most one of those pairs
 /// is right: leaves out what lies beyond the pairs that are as good as the best, within `slack_px`.
 ///
-/// Of `ends` it only asks whether the view that goes on is free there at all: a run may be left out on
-/// top of, and far longer than, the samples that the alignment was allowed to skip.
+/// Of the freedom of both views' ends it only asks whether the view that goes on is free there at all: a run
+/// may be left out on top of, and far longer than, what the alignment was allowed to skip.
 fn trim_end_runs(
     path: &[(usize, usize)],
     costs: &CostModel,
-    ends: &OpenEnds,
+    [free1, free2]: [FreeEnds; 2],
     slack_px: f64,
 ) -> Vec<(usize, usize)> {
     let beyond = |cells: &mut dyn Iterator<Item = (usize, usize)>, free1: bool, free2: bool| {
@@ -456,9 +458,9 @@ fn trim_end_runs(
         let least = run.iter().copied().fold(f64::INFINITY, f64::min);
         run.iter().position(|d| *d <= least + slack_px).unwrap_or(0)
     };
-    let back = beyond(&mut path.iter().rev().copied(), ends.end1 > 0, ends.end2 > 0);
+    let back = beyond(&mut path.iter().rev().copied(), free1.end_px > 0.0, free2.end_px > 0.0);
     let path = &path[..path.len() - back];
-    let front = beyond(&mut path.iter().copied(), ends.begin1 > 0, ends.begin2 > 0);
+    let front = beyond(&mut path.iter().copied(), free1.begin_px > 0.0, free2.begin_px > 0.0);
     path[front..].to_vec()
 }
 

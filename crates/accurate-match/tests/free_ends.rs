@@ -350,6 +350,32 @@ fn a_run_at_a_free_end_is_left_out_beyond_the_free_length() {
 }
 
 #[test]
+fn an_end_that_is_seen_is_kept_though_its_point_stands_twice_and_a_free_one_is_free_however_short()
+{
+    let k = Matrix3::new(1000.0, 0.0, 256.0, 0.0, 1000.0, 256.0, 0.0, 0.0, 1.0);
+    let size = ImageSize { width: 512, height: 512 };
+    let camera =
+        |x: f64| Camera::new(k, Matrix3::identity(), Vector3::new(x, 0.0, 0.0), size).unwrap();
+    let rig = Rig::new(camera(0.0), camera(-10.0), LengthUnit::Unit).unwrap();
+    let at = |k: u32| (0.99_f64.sqrt() * f64::from(k), 0.1 * f64::from(k));
+    let c1: Vec<_> = (0..60).map(|k| Pixel::new(300.0 + at(k).0, 200.0 + at(k).1)).collect();
+    let mut c2: Vec<_> = (0..80).map(|k| Pixel::new(200.0 + at(k).0, 200.0 + at(k).1)).collect();
+    c2.push(c2[79]);
+    let matched2 = |end_px: f64| {
+        let params = FreeMatchParams {
+            prices: MovePrices { end_skip: 0.06, ..TRUSTING.prices },
+            free1: FreeEnds::NONE,
+            free2: FreeEnds { begin_px: 0.0, end_px },
+            end_run_px: 0.3,
+            ..TRUSTING
+        };
+        FreeMatcher::new(params).match_directed(&c1, &c2, false, &rig).unwrap().matched2
+    };
+    assert_eq!(matched2(0.0), 0..81);
+    assert_eq!(matched2(0.9), 0..64);
+}
+
+#[test]
 fn unusable_input_is_refused_by_name() {
     let rig = scenes::rig(1.2, 20.0, 1500.0, 1500.0);
     let (c1, c2) = ([Pixel::new(500.0, 500.0)], [Pixel::new(500.0, 500.0)]);

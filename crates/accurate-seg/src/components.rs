@@ -87,7 +87,7 @@ pub(crate) fn to_image(
     width: usize,
     bytes: impl Iterator<Item = u8>,
 ) -> Result<GrayImage, SegError> {
-    let too_large = || SegError::TooLarge { height, width };
+    let too_large = || SegError::TooLarge { height, width, most: u32::MAX.into() };
     if height.checked_mul(width).and_then(|pixels| u32::try_from(pixels).ok()).is_none() {
         return Err(too_large());
     }
@@ -124,7 +124,10 @@ mod tests {
     fn an_image_beyond_the_indices_of_imageproc_is_refused() {
         for side in [1 << 16, usize::MAX] {
             let error = to_image(side, side, std::iter::empty()).unwrap_err();
-            assert_eq!(error, SegError::TooLarge { height: side, width: side });
+            assert_eq!(
+                error,
+                SegError::TooLarge { height: side, width: side, most: u32::MAX.into() }
+            );
         }
     }
 

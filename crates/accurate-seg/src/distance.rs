@@ -89,9 +89,10 @@ fn distances_along_rows(
                 least = least.min(squared(left.min(right)).saturating_add(across));
             }
             *found = (least as f64).sqrt();
-        }
-        if steps > most_steps {
-            return None;
+            // Not once a row: one row may be the whole mask.
+            if steps > most_steps {
+                return None;
+            }
         }
     }
     Some(distances)
@@ -105,8 +106,11 @@ fn distances_of_thick(mask: &Mask) -> Result<Array2<f64>, SegError> {
     let squared = euclidean_squared_distance_transform(&to_image(height, width, background)?);
     let distances = squared.into_raw().into_iter().map(f64::sqrt).collect();
     // imageproc's buffer is row by row, as ours; the sizes agree by construction.
-    Array2::from_shape_vec((height, width), distances)
-        .map_err(|_| SegError::TooLarge { height, width })
+    Array2::from_shape_vec((height, width), distances).map_err(|_| SegError::TooLarge {
+        height,
+        width,
+        most: u32::MAX.into(),
+    })
 }
 
 /// Median width of the strands of a mask, px: `2 median(d) - 1`, with `d` the
@@ -168,6 +172,15 @@ mod tests {
             let thin = distances_along_rows(&columns, height, width, usize::MAX);
             prop_assert_eq!(thin.unwrap(), distances_of_thick(&mask).unwrap());
         }
+    }
+
+    /// One row, all of it body but for a pixel: every other is measured against its whole half.
+    #[test]
+    fn the_steps_of_a_wide_row_are_counted_within_it() {
+        let mut row = vec![NONE; 4000];
+        row[0] = 0;
+        assert!(distances_along_rows(&row, 1, 4000, 100_000).is_none());
+        assert!(distances_along_rows(&row[..300], 1, 300, 100_000).is_some());
     }
 
     #[test]

@@ -12,13 +12,15 @@ pub enum SegError {
         /// Columns, px.
         width: usize,
     },
-    /// The image is larger than the labelling and distance routines can index.
-    #[error("image of {height} rows and {width} columns is too large: at most 2^32 - 1 pixels")]
+    /// The image is larger than a routine can index, or than a network is given.
+    #[error("image of {height} rows and {width} columns is too large: at most {most} pixels")]
     TooLarge {
         /// Rows, px.
         height: usize,
         /// Columns, px.
         width: usize,
+        /// Most pixels.
+        most: u64,
     },
     /// The mask has no foreground pixel.
     #[error("mask of {height} rows and {width} columns has no foreground pixel")]
@@ -62,6 +64,24 @@ pub enum SegError {
         column: usize,
         /// Its value.
         value: f32,
+    },
+    /// A value of a probability map is no probability.
+    #[error("probability at row {row}, column {column} is {value}; expected 0 to 1")]
+    NotAProbability {
+        /// Row, from 0.
+        row: usize,
+        /// Column, from 0.
+        column: usize,
+        /// Its value.
+        value: f32,
+    },
+    /// A length that something is looked for with is not positive, or beyond any image.
+    #[error("{name} is {value}; expected more than 0 and less than 100000")]
+    BadLength {
+        /// The field.
+        name: &'static str,
+        /// Its value.
+        value: f64,
     },
     /// A threshold is NaN.
     #[error("threshold `{name}` is not a number")]

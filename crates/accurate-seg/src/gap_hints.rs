@@ -38,6 +38,9 @@ pub struct GapHint {
     pub mean_probability: f32,
 }
 
+/// By how much rounding may carry a probability beyond 0 or 1.
+const ROUNDING: f32 = 1e-5;
+
 /// Where the body may go on between two pieces of its mask: for each tip of the mask's skeleton the
 /// way of the greatest probability to another part of the mask, if there is one. A gap that is found
 /// from both of its tips is given once.
@@ -45,7 +48,8 @@ pub struct GapHint {
 /// `probability` and the mask have the same shape, `(height, width)`.
 ///
 /// # Errors
-/// [`SegError::WrongShape`], [`SegError::NotFinite`].
+/// [`SegError::WrongShape`], [`SegError::NotFinite`], [`SegError::NotAProbability`] for a value that is not
+/// in 0 to 1.
 ///
 /// # Cost
 /// Thinning once; then Dijkstra's algorithm over the pixels around each tip that show a trace.
@@ -55,6 +59,12 @@ pub fn gap_hints(
     params: &GapParams,
 ) -> Result<Vec<GapHint>, SegError> {
     mask.require_map(probability)?;
+    for ((row, column), &value) in probability.indexed_iter() {
+        // Beyond 1 a way would pay, and a round trip the more; rounding is made good where it is priced.
+        if !(-ROUNDING..=1.0 + ROUNDING).contains(&value) {
+            return Err(SegError::NotAProbability { row, column, value });
+        }
+    }
     if mask.is_empty() {
         return Ok(Vec::new());
     }
@@ -156,7 +166,7 @@ fn search(
             let price = if is_own {
                 0.0
             } else {
-                0.05 - f64::from(probability[next].max(params.least)).ln()
+                0.05 - f64::from(probability[next].clamp(params.least, 1.0)).ln()
             };
             let cost = cost + step * price;
             if best.get(&next).is_none_or(|(known, ..)| cost < *known) {
@@ -246,6 +256,16 @@ mod tests {
         });
         let mask = Mask::from_array(probability.mapv(|p| p > 0.5)).unwrap();
         (probability, mask)
+    }
+
+    #[test]
+    fn a_map_of_grey_values_is_refused() {
+        let (probability, mask) = strands(|row, _| if row.abs_diff(20) <= 1 { 0.2 } else { 0.001 });
+        let (row, column, value) = (19, 5, 0.9 * 255.0);
+        assert_eq!(
+            gap_hints(&(probability * 255.0), &mask, &GapParams::DEFAULT).unwrap_err(),
+            SegError::NotAProbability { row, column, value }
+        );
     }
 
     #[test]

@@ -36,6 +36,20 @@ impl RidgeParams {
         let sigma_px = (width_px / (2.0 * 3.0_f64.sqrt())).max(1.0);
         Self { sigma_px, reach_px: (0.5 * width_px).max(1.5), widest_px: 4.0 * width_px.max(3.0) }
     }
+
+    fn validate(&self) -> Result<(), SegError> {
+        for (name, value) in [
+            ("sigma_px", self.sigma_px),
+            ("reach_px", self.reach_px),
+            ("widest_px", self.widest_px),
+        ] {
+            // No image is wider.
+            if !(value > 0.0 && value < 1e5) {
+                return Err(SegError::BadLength { name, value });
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The ridge of a probability map at the pixels of a skeleton, to a fraction of a pixel, and the width
@@ -49,7 +63,7 @@ impl RidgeParams {
 /// the values of the border.
 ///
 /// # Errors
-/// [`SegError::WrongShape`], [`SegError::NotFinite`].
+/// [`SegError::WrongShape`], [`SegError::NotFinite`], [`SegError::BadLength`] for a parameter.
 ///
 /// # Source
 /// C. Steger, "An unbiased detector of curvilinear structures", IEEE PAMI 20, 1998: the first derivative
@@ -62,6 +76,7 @@ pub fn ridge_centreline(
     skeleton: &Mask,
     params: &RidgeParams,
 ) -> Result<Vec<RidgePoint>, SegError> {
+    params.validate()?;
     skeleton.require_map(map)?;
     let pixels = skeleton.foreground();
     Ok(pixels.filter_map(|(row, column)| ridge_at(map, column, row, params)).collect())
@@ -236,6 +251,25 @@ mod tests {
         // The border's continuation bends the ends of a slanted bar.
         let margin = 8.0..SIDE as f64 - 8.0;
         margin.contains(&point.x) && margin.contains(&point.y)
+    }
+
+    #[test]
+    fn lengths_that_no_image_has_are_refused() {
+        let map = Array2::zeros((4, 4));
+        let skeleton = Mask::from_array(Array2::from_elem((4, 4), true)).unwrap();
+        let usual = RidgeParams::for_width(3.0);
+        for (params, name) in [
+            (RidgeParams { widest_px: f64::INFINITY, ..usual }, "widest_px"),
+            (RidgeParams { sigma_px: f64::INFINITY, ..usual }, "sigma_px"),
+            (RidgeParams { sigma_px: 0.0, ..usual }, "sigma_px"),
+            (RidgeParams { reach_px: f64::NAN, ..usual }, "reach_px"),
+        ] {
+            let refused = ridge_centreline(&map, &skeleton, &params).unwrap_err();
+            assert!(
+                matches!(refused, SegError::BadLength { name: n, .. } if n == name),
+                "{refused}"
+            );
+        }
     }
 
     proptest! {

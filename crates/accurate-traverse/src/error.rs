@@ -128,8 +128,11 @@ pub enum TraverseError {
         /// The radius, px.
         value: f64,
     },
-    /// No two pixels of the skeleton touch.
-    #[error("view {view}: {pixels} skeleton pixels, none touches another")]
+    /// The skeleton has no strand: no two pixels touch, or all that do are blobs.
+    #[error(
+        "view {view}: {pixels} skeleton pixels, but no strand among them (specks, or a mask that was not \
+         thinned)"
+    )]
     NoEdge {
         /// 1 or 2.
         view: u8,

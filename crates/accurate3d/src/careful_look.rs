@@ -1,4 +1,5 @@
 use accurate_eval::curve_scores;
+use accurate_fit::FitError;
 use accurate_seg::{SegError, Segmenter, Watch};
 use serde::Serialize;
 
@@ -42,6 +43,9 @@ pub fn reconstruct_images(
         Err(error @ Error::Segmentation { source: SegError::Cancelled { .. }, .. }) => {
             return Err(error);
         }
+        Err(error @ Error::Segmentation { source: SegError::Engine { .. }, .. }) => {
+            return Err(error);
+        }
         // No other way, or nothing found: the first look is all there is.
         Ok(None) | Err(_) => return first.map(|curve| (curve, None)),
     };
@@ -70,7 +74,13 @@ fn is_worth_a_look(first: &Result<Reconstruction, Error>, params: &Params) -> bo
             .diagnostics
             .outline
             .is_some_and(|outline| calls_for_a_careful_look(&outline.evidence)),
-        Err(Error::NotSegmented { .. } | Error::MissingInput { .. }) => false,
+        // Another segmentation changes nothing of these.
+        Err(
+            Error::NotSegmented { .. }
+            | Error::MissingInput { .. }
+            | Error::OtherSize { .. }
+            | Error::Fitting { source: FitError::BadParameter { .. }, .. },
+        ) => false,
         Err(_) => true,
     }
 }

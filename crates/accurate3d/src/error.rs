@@ -2,6 +2,7 @@ use std::fmt;
 
 use accurate_eval::EvalError;
 use accurate_fit::FitError;
+use accurate_geom::LengthUnit;
 use accurate_io::IoError;
 use accurate_match::MatchError;
 use accurate_seg::SegError;
@@ -136,6 +137,14 @@ pub enum Error {
     /// A case could not be generated.
     #[error(transparent)]
     Synthesis(#[from] SynthError),
+    /// Distances in different units have no mean.
+    #[error("set {set}: pairs in {} and in {}", units[0], units[1])]
+    MixedUnits {
+        /// Name of the case set.
+        set: String,
+        /// That of the first pair, and another.
+        units: [LengthUnit; 2],
+    },
     /// A figure needs something to show.
     #[error("the figure has no case to show")]
     NoCase,
@@ -162,6 +171,7 @@ impl Error {
             | Self::Scoring(_)
             | Self::Synthesis(_)
             | Self::NoCase
+            | Self::MixedUnits { .. }
             | Self::Report { .. } => None,
         }
     }

@@ -114,7 +114,8 @@ pub(crate) fn plane_panel(
     let points: Vec<Point2> = reference.iter().chain(curve).map(&flatten).collect();
     let (low, high) =
         points.iter().fold((points[0], points[0]), |(low, high), p| (low.inf(p), high.sup(p)));
-    let extent = (high - low).amax().max(f64::MIN_POSITIVE);
+    // A single point has none.
+    let extent = Some((high - low).amax()).filter(|extent| *extent > 0.0).unwrap_or(1.0);
     let scale = (PANEL - 50.0) / extent;
     let centre = Point2::from((low.coords + high.coords) / 2.0);
     let place = |p: &Point3| {

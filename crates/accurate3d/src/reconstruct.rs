@@ -244,8 +244,10 @@ fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Erro
         }
         None => (masks, [0, 0]),
     };
+    // As given: what takes effect has mended some of them.
+    let given = params.robust.validate();
+    given.map_err(|source| Error::Fitting { case: pair.id.clone(), source })?;
     let robust = params.in_effect();
-    robust.validate().map_err(|source| Error::Fitting { case: pair.id.clone(), source })?;
     let by_grey_levels =
         maps.is_some() && params.robust.by_grey_levels && params.closure == Closure::Open;
     let images = pair.images.as_ref().filter(|_| by_grey_levels);

@@ -34,7 +34,9 @@ fn a_mask_of_another_size_than_its_cameras_image_is_refused() {
 fn weights_and_priors_that_nothing_can_be_compared_by_are_refused() {
     let pair = pair();
     type Spoil = fn(&mut Params);
-    let spoils: [(&str, Spoil); 5] = [
+    let spoils: [(&str, Spoil); 7] = [
+        ("clear_lead", |p| p.robust.clear_lead = f64::NAN),
+        ("clear_lead", |p| p.robust.clear_lead = -1.0),
         ("contenders", |p| p.robust.contenders = -1.0),
         ("contenders", |p| p.robust.contenders = f64::NAN),
         ("walk_weight", |p| p.robust.walk_weight = f64::NAN),

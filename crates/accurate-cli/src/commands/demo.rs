@@ -19,7 +19,7 @@ const INDEX: u64 = 4;
 pub fn run(args: &DemoArgs, console: &Console) -> Result<(), Failure> {
     let dir = args.out.join("pair");
     let case = generate(FAMILY, SEED, INDEX, &CaseOptions::default())?;
-    write_pair(&dir, &contents_of(case, PointsKind::Exact, None))?;
+    write_pair(&dir, &contents_of(case, PointsKind::Exact, None)).map_err(Failure::of_output)?;
     let parts = PairParts { points: true, masks: true, images: false, truth: Truth::Required };
     let pair = ViewPair::from(read_pair(&dir, parts)?);
     let params = Params::new(InputKind::Mask, Method::default());

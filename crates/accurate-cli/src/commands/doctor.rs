@@ -16,7 +16,7 @@ use crate::args::DoctorArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::text::{has_extension, make_place};
-use crate::two_views::two_cameras;
+use crate::two_views::{refuse_other_size, two_cameras};
 
 /// `accurate camera doctor`: what is wrong with two cameras, by what was seen with them.
 pub fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
@@ -67,17 +67,25 @@ fn examined(args: &DoctorArgs) -> Result<([NamedView; 2], Option<Seen>), Failure
         return Err(usage("--matched, --points and --masks are three kinds of the same: give one"));
     }
     let named = !kinds.iter().all(|files| files.is_empty());
-    let folders = args.files.iter().all(|f| f.is_dir() && !f.join("cameras.txt").is_file());
+    let folders = !args.files.is_empty()
+        && args.files.iter().all(|f| f.is_dir() && !f.join("cameras.txt").is_file());
     if folders {
         let (views, seen) = of_pair_folders(&args.files)?;
-        return Ok((views, if named { of_files(args)? } else { seen }));
+        let seen = if named { of_files(args, &views)? } else { seen };
+        return Ok((views, seen));
     }
     let views = two_cameras(&args.files, &args.views, &args.stated.defaults())?;
-    Ok((views, of_files(args)?))
+    if views[0].camera == views[1].camera {
+        let message = format!("`{}` and `{}` are the same camera", views[0].name, views[1].name);
+        return Err(Failure::new(Failure::USAGE, message)
+            .with_hint("two views of two places are examined: is one file named twice?"));
+    }
+    let seen = of_files(args, &views)?;
+    Ok((views, seen))
 }
 
-/// What the options name.
-fn of_files(args: &DoctorArgs) -> Result<Option<Seen>, Failure> {
+/// What the options name, as the cameras see it.
+fn of_files(args: &DoctorArgs, views: &[NamedView; 2]) -> Result<Option<Seen>, Failure> {
     if !args.matched.is_empty() {
         let mut pairs = Vec::new();
         for files in args.matched.chunks_exact(2) {
@@ -103,7 +111,7 @@ fn of_files(args: &DoctorArgs) -> Result<Option<Seen>, Failure> {
         curves.push([points_of(&files[0])?, points_of(&files[1])?]);
     }
     for files in args.masks.chunks_exact(2) {
-        curves.push([traced(&files[0])?, traced(&files[1])?]);
+        curves.push([traced(&files[0], &views[0].camera)?, traced(&files[1], &views[1].camera)?]);
     }
     Ok((!curves.is_empty()).then_some(Seen::Curves(curves)))
 }
@@ -160,8 +168,10 @@ fn points_of(path: &Path) -> Result<Vec<Point2>, Failure> {
     Ok(read_points::<View1>(path)?.iter().map(|p| p.point()).collect())
 }
 
-fn traced(path: &Path) -> Result<Vec<Point2>, Failure> {
-    traced_mask(read_mask(path)?).map_err(|failure| failure.of_file(path))
+fn traced(path: &Path, camera: &Camera) -> Result<Vec<Point2>, Failure> {
+    let mask = read_mask(path)?;
+    refuse_other_size(path, mask.dim(), camera)?;
+    traced_mask(mask).map_err(|failure| failure.of_file(path))
 }
 
 fn traced_mask(mask: ndarray::Array2<bool>) -> Result<Vec<Point2>, Failure> {

@@ -12,11 +12,15 @@ use crate::args::EvalArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::text::has_extension;
-use crate::two_views::cameras_of;
+use crate::two_views::{cameras_of, refuse_other_size};
 use crate::units::common_unit;
 
 /// `accurate eval`: the paper's scores and the point-to-polyline ones, as JSON.
 pub fn run(args: &EvalArgs, console: &Console) -> Result<(), Failure> {
+    if let Some(spacing) = args.spacing.filter(|spacing| !(*spacing > 0.0 && spacing.is_finite())) {
+        let message = format!("--spacing is {spacing}; expected a positive length");
+        return Err(Failure::new(Failure::USAGE, message));
+    }
     let curve = read_curve(&args.curve)?;
     let truth = read_curve(&args.truth)?;
     let mut unit = common_unit(("the curve", curve.unit), ("the truth", truth.unit))?;
@@ -72,7 +76,9 @@ fn third_view(
             .collect::<Result<_, _>>()
             .map_err(|e| Failure::new(Failure::BAD_INPUT, format!("{}: {e}", seen.display())))?
     } else {
-        let skeleton = Skeleton::of(&zhang_suen(&Mask::from_array(read_mask(seen)?)?))?;
+        let mask = read_mask(seen)?;
+        refuse_other_size(seen, mask.dim(), &view.camera)?;
+        let skeleton = Skeleton::of(&zhang_suen(&Mask::from_array(mask)?))?;
         skeleton.pixels_as::<View1>().iter().map(|p| p.point()).collect()
     };
     let line = Polyline3::new(curve.to_vec())

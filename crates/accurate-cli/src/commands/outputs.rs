@@ -8,7 +8,9 @@ use serde_json::Value;
 use crate::args::{Extra, ReconstructArgs};
 use crate::failure::Failure;
 use crate::raster::write_picture;
-use crate::text::{check_folder, check_output, make_folder, remove_file, write_text};
+use crate::text::{
+    check_folder, check_output, make_folder, refuse_what_is_read, remove_file, write_text,
+};
 
 /// Where the results of a command go: at most one folder, and single files.
 #[derive(Debug, Clone, Default)]
@@ -41,7 +43,7 @@ impl Outputs {
         let config = Some(config.to_owned());
         let mut outputs = Self { extras: args.also.clone(), config, ..Self::default() };
         for path in &args.out {
-            if kind_of(path).is_some() {
+            if kind_of(path).is_some() && !ends_as_folder(path) {
                 outputs.files.push(path.clone());
             } else if !is_folder_name(path) {
                 let message = format!("{}: unknown extension", path.display());
@@ -90,32 +92,33 @@ impl Outputs {
     }
 
     /// Refuses, before the work, places that cannot be written to, and those of files that are read.
-    pub fn check(&self, read: &[&PathBuf]) -> Result<(), Failure> {
+    pub fn check(&self, read: &[PathBuf]) -> Result<(), Failure> {
         let mut written = self.files.clone();
         if let Some(folder) = &self.folder {
             check_folder(folder)?;
             written.extend(own_names().map(|name| folder.join(name)));
         }
-        let read: Vec<PathBuf> = read.iter().filter_map(|path| path.canonicalize().ok()).collect();
-        for file in &written {
+        written.iter().try_for_each(|file| {
             check_output(file)?;
-            if file.canonicalize().is_ok_and(|file| read.contains(&file)) {
-                let message = format!("{} is read, and would be replaced", file.display());
-                return Err(Failure::new(Failure::USAGE, message)
-                    .with_hint("give another place for the results"));
-            }
-        }
-        Ok(())
+            refuse_what_is_read(file, read)
+        })
     }
 
-    /// Writes everything. A folder that holds `result.json` is whole and of one run: an old one goes
-    /// first, then what an earlier run wrote and this one does not; the new one comes last.
+    /// Writes everything, single files first: where one cannot be, the folder stays as it was. A folder that
+    /// holds `result.json` is whole and of one run: an old one goes first, then what an earlier run wrote
+    /// and this one does not; the new one comes last.
     pub fn write(
         &self,
         pair: &ViewPair,
         reconstruction: &Reconstruction,
         result: &Value,
     ) -> Result<(), Failure> {
+        for file in &self.files {
+            if let Some(parent) = file.parent().filter(|p| !p.as_os_str().is_empty()) {
+                make_folder(parent)?;
+            }
+            write_one(file, pair, reconstruction, result)?;
+        }
         if let Some(folder) = &self.folder {
             make_folder(folder)?;
             // What a run that was killed while writing left here.
@@ -128,14 +131,6 @@ impl Outputs {
             for extra in &self.extras {
                 write_one(&folder.join(extra.file_name()), pair, reconstruction, result)?;
             }
-        }
-        for file in &self.files {
-            if let Some(parent) = file.parent().filter(|p| !p.as_os_str().is_empty()) {
-                make_folder(parent)?;
-            }
-            write_one(file, pair, reconstruction, result)?;
-        }
-        if let Some(folder) = &self.folder {
             write_json(&folder.join(RESULT), result).map_err(Failure::of_output)?;
         }
         Ok(())
@@ -161,9 +156,11 @@ fn own_names() -> impl Iterator<Item = &'static str> {
 
 /// Whether a name that is no file of results may be a folder's.
 fn is_folder_name(path: &Path) -> bool {
-    path.extension().is_none()
-        || path.is_dir()
-        || path.as_os_str().as_encoded_bytes().ends_with(b"/")
+    path.extension().is_none() || path.is_dir() || ends_as_folder(path)
+}
+
+fn ends_as_folder(path: &Path) -> bool {
+    path.as_os_str().as_encoded_bytes().ends_with(b"/")
 }
 
 fn kind_of(path: &Path) -> Option<Kind> {

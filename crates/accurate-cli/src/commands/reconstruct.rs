@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use accurate3d::fit::CalibrationPriors;
-use accurate3d::io::{PairParts, Truth, find_pairs, hash_file, hash_pair, read_pair};
+use accurate3d::io::{PairParts, Truth, find_pairs, hash_file, hash_pair, pair_files, read_pair};
 use accurate3d::seg::network::NetworkSegmenter;
 use accurate3d::seg::{Polarity, Segmenter, unwatched};
 use accurate3d::{
@@ -15,10 +15,11 @@ use serde_json::{Value, json};
 use super::eval::table_scores;
 use super::outputs::Outputs;
 use crate::args::ReconstructArgs;
+use crate::code::Code;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::segmentation::segmenter;
-use crate::two_views::{are_files, pair_of_files};
+use crate::two_views::{are_files, files_behind, pair_of_files};
 
 /// What one run reads.
 enum Source {
@@ -33,8 +34,7 @@ enum Source {
 pub fn run(args: &ReconstructArgs, config: &str, console: &Console) -> Result<(), Failure> {
     refuse_what_takes_no_effect(args)?;
     let jobs = jobs(args, config)?;
-    let read: Vec<&PathBuf> =
-        args.inputs.iter().chain(&args.views.cameras).chain(&args.truth).collect();
+    let read = everything_read(args, &jobs);
     for (_, outputs) in &jobs {
         outputs.check(&read)?;
     }
@@ -85,6 +85,20 @@ pub fn run(args: &ReconstructArgs, config: &str, console: &Console) -> Result<()
         Some(failure) if total == 1 => Err(failure),
         Some(failure) => Err(failure.about(format!("{failed} of {total} pairs failed"))),
     }
+}
+
+/// Every file behind the inputs, and what lies in their folders though this run may not look at it.
+fn everything_read(args: &ReconstructArgs, jobs: &[(Source, Outputs)]) -> Vec<PathBuf> {
+    const ALL: PairParts =
+        PairParts { points: true, masks: true, images: true, truth: Truth::IfPresent };
+    let mut read: Vec<PathBuf> = args.inputs.iter().chain(&args.truth).cloned().collect();
+    read.extend(args.views.cameras.iter().flat_map(|path| files_behind(path)));
+    for (source, _) in jobs {
+        if let Source::Folder(dir) = source {
+            read.extend(pair_files(dir, ALL));
+        }
+    }
+    read
 }
 
 /// Options that the method would pass over without a word.
@@ -204,6 +218,35 @@ fn check_points(pair: &ViewPair) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Refuses one picture, or one list of points, in the place of both views.
+fn check_views(pair: &ViewPair) -> Result<(), Failure> {
+    let points = pair.points.as_ref().is_some_and(|(one, two)| {
+        one.len() == two.len() && one.iter().zip(two).all(|(a, b)| a.point() == b.point())
+    });
+    let masks = pair.masks.as_ref().is_some_and(|[one, two]| one == two);
+    let images = pair.images.as_ref().is_some_and(|[one, two]| one == two);
+    for (same, what) in [(points, "points"), (masks, "masks"), (images, "images")] {
+        if same {
+            let message = format!("{}: the {what} of both views are the same", pair.id);
+            return Err(Failure::new(Failure::BAD_INPUT, message)
+                .with_hint("two cameras never see the same: is one file named twice?"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses what is no curve, before anything is written.
+fn check_curve(reconstruction: &Reconstruction) -> Result<(), Failure> {
+    if reconstruction.points.len() >= 2 && reconstruction.length() > 0.0 {
+        return Ok(());
+    }
+    let points = reconstruction.points.len();
+    let message = format!("{}: {points} point, which is no curve", reconstruction.id);
+    Err(Failure::new(Code::NoMatch, message).with_hint(
+        "almost nothing of the two views goes together: are points and cameras of the same image size?",
+    ))
+}
+
 fn read(source: &Source, args: &ReconstructArgs, has_report: bool) -> Result<Read, Failure> {
     let dir = match source {
         Source::Folder(dir) => dir,
@@ -253,6 +296,7 @@ fn one(
     let polarity = args.grey.polarity();
     pair.images = pair.images.map(|both| both.map(|image| polarity.with_body_dark(image)));
     check_points(&pair)?;
+    check_views(&pair)?;
     let pair = match segmenter {
         Some(segmenter) => segment_images(pair, segmenter, &unwatched)?,
         None => pair,
@@ -265,6 +309,7 @@ fn one(
         None => (reconstruct(&pair, &params)?, None),
     };
     let pair = seen.unwrap_or(pair);
+    check_curve(&reconstruction)?;
     let mut result = result_json(&shown, inputs, &pair, &params, &reconstruction)?;
     if let Some(segmenter) = segmenter {
         result["parameters"]["segmentation"] = Value::from(segmenter.describe());

@@ -87,18 +87,19 @@ fn one(
     let image = read_grey(path)?.values;
     let found = segmenter.segment(&polarity.with_body_dark(image.clone()), &unwatched)?;
     let skeleton = zhang_suen(&found.mask);
+    let width = if found.mask.is_empty() { None } else { Some(median_width_px(&found.mask)?) };
+    let params = RidgeParams::for_width(width.unwrap_or(1.0));
+    let ridge = ridge_centreline(&found.probability, &skeleton, &params)?;
+    let pieces = Components::of(&found.mask)?.sizes().len();
+    // Nothing that can fail but the disk comes after the first file.
     let file = |what: &str| out.join(format!("{name}_{what}.png"));
     write_mask(&file("mask"), found.mask.as_array())?;
     // 0 to 1 becomes 0 to 65 535.
     let sixteen = found.probability.mapv(|p| (p * 65_535.0).round() as u16);
     write_u16(&file("probability"), &sixteen)?;
     write_rgb(&file("overlay"), &overlay(&image, &skeleton))?;
-    let width = if found.mask.is_empty() { None } else { Some(median_width_px(&found.mask)?) };
-    let params = RidgeParams::for_width(width.unwrap_or(1.0));
-    let ridge = ridge_centreline(&found.probability, &skeleton, &params)?;
     let centreline = out.join(format!("{name}_centreline.csv"));
     write_text(&centreline, &centreline_csv(&ridge))?;
-    let pieces = Components::of(&found.mask)?.sizes().len();
     let (height, columns) = image.dim();
     Ok(json!({
         "image": path.display().to_string(),

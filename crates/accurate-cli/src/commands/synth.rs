@@ -13,10 +13,12 @@ use super::xray;
 use crate::args::{CasesArgs, Disturbances, PointsKind, SynthArgs, SynthCommand};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::{make_folder, read_text, remove_file};
+use crate::text::{make_folder, read_text, remove_file, write_text};
 
 /// What the source of a generated case begins with.
 const SOURCE: &str = "accurate synth";
+/// Stands in a case's folder while it is written.
+const UNFINISHED: &str = ".accurate-synth-unfinished";
 
 /// `accurate synth`: pair folders of a family, or single X-ray images.
 pub fn run(args: &SynthArgs, console: &Console) -> Result<(), Failure> {
@@ -46,8 +48,9 @@ fn generate_cases(
         let case = generate(family, args.seed, index, &options)?;
         let images = args.xray.then(|| xray_images(&case));
         let dir = out.join(format!("case_{index:03}"));
-        remove_earlier(&dir, images.is_some())?;
+        begin(&dir, images.is_some())?;
         write_pair(&dir, &contents_of(case, args.points, images))?;
+        remove_file(&dir.join(UNFINISHED))?;
         bar.inc(1);
         Ok::<(), Failure>(())
     })?;
@@ -86,28 +89,33 @@ fn source_of(case: &Path) -> Option<String> {
     described["source"].as_str().map(str::to_owned)
 }
 
-/// Removes what an earlier run wrote to a case's folder and this run will not: images belong to the
-/// cameras and the curve that they were drawn with. `meta.json` goes too, as the mark of a whole pair.
+/// Marks a case's folder as being written, and removes what an earlier run wrote there and this run will
+/// not: images belong to the cameras and the curve that they were drawn with. `meta.json` goes too, as the
+/// mark of a whole pair.
 ///
 /// # Errors
-/// [`Failure::USAGE`] for a folder that is not of this command.
-fn remove_earlier(dir: &Path, draws_images: bool) -> Result<(), Failure> {
-    let meta = dir.join("meta.json");
-    let is_ours = source_of(dir).is_some_and(|source| source.starts_with(SOURCE));
-    let mut stale = ["L", "R"].map(|view| dir.join(format!("images/view_{view}.png"))).to_vec();
-    stale.retain(|image| !draws_images && image.is_file());
-    // Without both, it is a run that was stopped, which begins anew.
-    if !is_ours && (meta.is_file() || !stale.is_empty()) {
+/// [`Failure::USAGE`] for a folder that holds a pair, or parts of one, that this command has not made.
+fn begin(dir: &Path, draws_images: bool) -> Result<(), Failure> {
+    const PARTS: [&str; 6] =
+        ["meta.json", "calibration", "points", "masks", "images", "annotations"];
+    let mark = dir.join(UNFINISHED);
+    // With the mark it is a run that was stopped, which begins anew.
+    let is_ours = mark.is_file() || source_of(dir).is_some_and(|source| source.starts_with(SOURCE));
+    if !is_ours && PARTS.iter().any(|part| dir.join(part).exists()) {
         let message = format!("{} is there, and `{SOURCE}` has not made it", dir.display());
         return Err(Failure::new(Failure::USAGE, message)
             .with_hint("give another --out, or remove that folder first"));
     }
-    stale.iter().try_for_each(|image| remove_file(image))?;
+    make_folder(dir)?;
+    write_text(&mark, "")?;
     if !draws_images {
+        for view in ["L", "R"] {
+            remove_file(&dir.join(format!("images/view_{view}.png")))?;
+        }
         // Left where it holds something else.
         let _ = fs::remove_dir(dir.join("images"));
     }
-    remove_file(&meta)
+    remove_file(&dir.join("meta.json"))
 }
 
 /// A generated case as the contents of a pair folder.

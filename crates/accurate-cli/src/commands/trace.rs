@@ -8,16 +8,19 @@ use accurate3d::traverse::{TraverseParams, trace_single};
 use crate::args::TraceArgs;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::{make_place, write_text};
+use crate::text::{make_place, refuse_what_is_read, write_text};
 
 /// `accurate trace`: a mask's skeleton in order, as `x,y` lines.
 pub fn run(args: &TraceArgs, console: &Console) -> Result<(), Failure> {
     if let Some(path) = &args.out {
         make_place(path)?;
+        refuse_what_is_read(path, std::slice::from_ref(&args.mask))?;
     }
-    let mask = Mask::from_array(read_mask(&args.mask)?)?;
-    let skeleton = Skeleton::of(&zhang_suen(&mask))?;
-    let trace = trace_single(&skeleton.pixels_as::<View1>(), &TraverseParams::PAPER)?;
+    let of_mask = |failure: Failure| failure.of_file(&args.mask);
+    let mask = Mask::from_array(read_mask(&args.mask)?).map_err(|e| of_mask(e.into()))?;
+    let skeleton = Skeleton::of(&zhang_suen(&mask)).map_err(|e| of_mask(e.into()))?;
+    let trace = trace_single(&skeleton.pixels_as::<View1>(), &TraverseParams::PAPER)
+        .map_err(|e| of_mask(e.into()))?;
     let mut csv = String::from("x,y\n");
     for p in &trace.points {
         let _ = writeln!(csv, "{},{}", p.x, p.y);

@@ -258,19 +258,25 @@ fn tables_come_in_every_format() {
 }
 
 #[test]
-fn a_folder_of_pairs_can_be_tabled() {
-    let text = stdout(
-        accurate()
-            .args([
-                "table", "--format", "json", "--scores", "polyline", "--method", "paper", "--set",
-            ])
-            .arg(samples()),
-    );
-    let table: Value = serde_json::from_str(&text).unwrap();
-    assert_eq!(table["cases"], 3);
-    for row in table["rows"].as_array().unwrap() {
-        assert_eq!(row["scored"], 3, "{row}");
+fn a_folder_of_pairs_can_be_tabled_if_they_are_in_one_unit() {
+    let dir = TempDir::new().unwrap();
+    for name in ["bend", "loop"] {
+        copy_of(name, dir.path());
     }
+    let table = || {
+        let mut command = accurate();
+        command.args(["table", "--format", "json", "--scores", "polyline", "--method", "paper"]);
+        command.arg("--set").arg(dir.path());
+        command
+    };
+    let found: Value = serde_json::from_str(&stdout(&mut table())).unwrap();
+    assert_eq!(found["cases"], 2);
+    for row in found["rows"].as_array().unwrap() {
+        assert_eq!(row["scored"], 2, "{row}");
+    }
+    copy_of("wire", dir.path());
+    let (code, message) = failure(&mut table());
+    assert!(code == 65 && message.contains("pairs in unit and in mm"), "{code} {message}");
 }
 
 #[test]

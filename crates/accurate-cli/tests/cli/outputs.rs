@@ -60,11 +60,13 @@ fn a_folder_of_results_is_of_one_run() {
     stdout(&mut run("wire", &["--also", "npy"]));
     let left = ["config.toml", "curve.csv", "curve.npy", "notes.txt", "result.json"];
     assert_eq!(names(&out), expected(&left));
-    // One that stops while it writes has no result to show.
+    // One that cannot write a file of its own leaves the folder as it was.
     if cfg!(target_os = "linux") {
+        let before = fs::read(out.join("result.json")).unwrap();
         let (code, message) = failure(&mut run("bend", &["-o", "/proc/none/w.csv"]));
         assert!(code == 74 && message.contains("/proc/none"), "{code} {message}");
-        assert_eq!(names(&out), expected(&["config.toml", "curve.csv", "notes.txt"]));
+        assert_eq!(names(&out), expected(&left));
+        assert_eq!(fs::read(out.join("result.json")).unwrap(), before);
     }
 }
 
@@ -192,7 +194,15 @@ fn a_generated_case_is_of_one_run() {
     assert!(meta["source"].as_str().unwrap().contains("seed 1501"), "{meta}");
     // A run that was stopped begins anew; a folder of something else is left alone.
     fs::remove_file(case.join("meta.json")).unwrap();
+    let mask = fs::read(case.join("masks/mask_L.png")).unwrap();
+    fs::write(case.join("masks/mask_L.png"), "someone's own").unwrap();
+    let (code, message) = failure(&mut synth("1501", &["--xray"]));
+    assert!(code == 2 && message.contains("case_000"), "{code} {message}");
+    assert_eq!(fs::read(case.join("masks/mask_L.png")).unwrap(), b"someone's own");
+    fs::write(case.join(".accurate-synth-unfinished"), "").unwrap();
     stdout(&mut synth("1501", &[]));
+    assert_eq!(fs::read(case.join("masks/mask_L.png")).unwrap(), mask);
+    assert!(!case.join(".accurate-synth-unfinished").exists());
     let foreign = meta.to_string().replace("accurate synth", "the clinic's");
     fs::write(case.join("meta.json"), &foreign).unwrap();
     let (code, message) = failure(&mut synth("1501", &[]));

@@ -109,7 +109,7 @@ fn mask_of(pair: &Path, view: &str, size: (usize, usize), on: &[(usize, usize)])
 #[test]
 fn empty_and_one_pixel_masks_are_refused() {
     refuses("mask", |p| mask_of(p, "L", (512, 512), &[]), 65, &["mask_L.png", "foreground"]);
-    refuses("mask", |p| mask_of(p, "R", (512, 512), &[(9, 9)]), 3, &["view 2", "1 "]);
+    refuses("mask", |p| mask_of(p, "R", (512, 512), &[(9, 9)]), 65, &["A027", "view 2", "1 "]);
 }
 
 #[test]
@@ -215,4 +215,54 @@ fn one_point_is_no_curve() {
             &["1 point in view", "hint"],
         );
     }
+}
+
+#[test]
+fn what_is_read_is_never_replaced() {
+    let dir = TempDir::new().unwrap();
+    let pair = copy_of("bend", dir.path());
+    for part in
+        ["points/points_L.csv", "masks/mask_L.png", "annotations/guidewire_3D.ply", "meta.json"]
+    {
+        let file = pair.join(part);
+        let before = fs::read(&file).unwrap();
+        let mut command = accurate();
+        command.args(["reconstruct", "-i", "mask", "-o"]).arg(&file).arg(&pair);
+        let (code, message) = failure(&mut command);
+        assert!(code == 2 && message.contains("would be replaced"), "{code} {message}");
+        assert_eq!(fs::read(&file).unwrap(), before, "{part}");
+    }
+    let mask = pair.join("masks/mask_L.png");
+    let before = fs::read(&mask).unwrap();
+    let (code, message) = failure(accurate().arg("trace").arg(&mask).arg("-o").arg(&mask));
+    assert!(code == 2 && message.contains("would be replaced"), "{code} {message}");
+    assert_eq!(fs::read(&mask).unwrap(), before);
+}
+
+#[test]
+fn one_view_in_the_place_of_both_is_refused() {
+    let same = |file: [&'static str; 2]| {
+        move |pair: &Path| {
+            fs::copy(pair.join(file[0]), pair.join(file[1])).unwrap();
+        }
+    };
+    let masks = same(["masks/mask_L.png", "masks/mask_R.png"]);
+    refuses("mask", masks, 65, &["masks of both views are the same", "named twice"]);
+    let points = same(["points/points_L.csv", "points/points_R.csv"]);
+    refuses("points", points, 65, &["points of both views are the same"]);
+}
+
+#[test]
+fn what_comes_out_as_a_single_point_is_no_curve() {
+    let dir = TempDir::new().unwrap();
+    let pair = copy_of("bend", dir.path());
+    write(pair.join("points/points_L.csv"), "x,y\n1,2\n100,200\n");
+    let out = dir.path().join("out");
+    let mut command = accurate();
+    command.args(["reconstruct", "-i", "points", "-o"]).arg(&out).arg(&pair);
+    let (code, message) = failure(&mut command);
+    assert!(code == 3 && message.contains("A013") && message.contains("hint"), "{code} {message}");
+    assert!(!out.exists());
+    let in_space = |pair: &Path| write(pair.join("points/points_L.csv"), "x,y,z\n1,2,3\n4,5,6\n");
+    refuses("points", in_space, 65, &["points_L.csv", "curve in space"]);
 }

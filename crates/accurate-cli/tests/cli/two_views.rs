@@ -373,3 +373,51 @@ fn files_without_frames_take_none() {
         assert!(code == 2 && said.contains("--frame"), "{code} {said}");
     }
 }
+
+#[test]
+fn a_unit_can_be_stated_for_a_pair_folder_that_states_none() {
+    let dir = TempDir::new().unwrap();
+    let pair = crate::program::copy_of("wire", dir.path());
+    fs::remove_file(pair.join("meta.json")).unwrap();
+    let rig = dir.path().join("rig.toml");
+    let mut command = accurate();
+    command.args(["camera", "convert", "--unit", "cm", "--to", "rig-toml", "-o"]).arg(&rig);
+    stdout(command.arg(&pair));
+    assert!(fs::read_to_string(&rig).unwrap().contains("\"cm\""));
+    // What is stated stays.
+    converted("wire", "rig-toml", &rig);
+    let again = dir.path().join("again.toml");
+    let mut command = accurate();
+    command.args(["camera", "convert", "--unit", "cm", "--to", "rig-toml", "-o"]).arg(&again);
+    stdout(command.arg(&rig));
+    assert!(fs::read_to_string(&again).unwrap().contains("\"mm\""));
+}
+
+#[test]
+fn a_truth_is_in_the_unit_of_its_cameras() {
+    let dir = TempDir::new().unwrap();
+    let mut command = accurate();
+    command.args(["synth", "carm", "-n", "1", "--out"]).arg(dir.path());
+    stdout(&mut command);
+    for folder in [dir.path().join("case_000"), sample("wire", "")] {
+        let bytes = fs::read(folder.join("annotations/guidewire_3D.ply")).unwrap();
+        let head = String::from_utf8_lossy(&bytes[..300]).into_owned();
+        assert!(head.contains("comment unit mm"), "{head}");
+    }
+}
+
+#[test]
+fn the_doctor_looks_at_sizes_and_at_who_is_who_before_it_looks_for_mistakes() {
+    let dir = TempDir::new().unwrap();
+    let rig = dir.path().join("rig.toml");
+    converted("bend", "rig-toml", &rig);
+    let masks = ["wire", "bend"].map(|name| sample(name, "masks/mask_L.png"));
+    let mut command = accurate();
+    command.args(["camera", "doctor"]).arg(&rig).arg("--masks").args(&masks);
+    let (code, message) = failure(&mut command);
+    assert!(code == 65 && message.contains("A022"), "{code} {message}");
+    let run = dir.path().join("XA.dcm");
+    fs::write(&run, crate::dicom::view([10.0, 0.0], 8, &[9; 64], &[])).unwrap();
+    let (code, message) = failure(accurate().args(["camera", "doctor"]).arg(&run).arg(&run));
+    assert!(code == 2 && message.contains("same camera"), "{code} {message}");
+}

@@ -2,7 +2,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use accurate_geom::{Camera, Rig};
+use accurate_geom::{Camera, LengthUnit, Rig};
 
 use super::colmap::{self, Part};
 use super::opencv::{self, StorageFile, Syntax};
@@ -77,10 +77,11 @@ pub fn read_cameras(paths: &[PathBuf], defaults: &ViewDefaults) -> Result<Vec<Na
         match file.kind {
             CameraSource::PairFolder => {
                 let pair = read_pair(path, PairParts::default())?;
-                views.extend(views_of_rig(&pair.rig, &pair.case_id));
+                views.extend(views_of_rig(&pair.rig, &pair.case_id, defaults));
             }
             CameraSource::Rig => {
-                views.extend(views_of_rig(&parse_rig(path, file.text()?)?, &stem(path)));
+                let rig = parse_rig(path, file.text()?)?;
+                views.extend(views_of_rig(&rig, &stem(path), defaults));
             }
             CameraSource::Colmap => {
                 let folder = file.folder();
@@ -162,11 +163,13 @@ fn dicom_view(path: &Path) -> Result<NamedView, IoError> {
     Err(IoError::Unsupported { path: path.to_owned(), what })
 }
 
-fn views_of_rig(rig: &Rig, name: &str) -> [NamedView; 2] {
+fn views_of_rig(rig: &Rig, name: &str, defaults: &ViewDefaults) -> [NamedView; 2] {
+    // A plain unit is what is left where none is stated.
+    let stated = Some(rig.unit()).filter(|unit| *unit != LengthUnit::Unit);
     let view = |camera: &Camera, number: u8| NamedView {
         name: format!("{name}_{number}"),
         camera: camera.clone(),
-        unit: rig.unit(),
+        unit: stated.or(defaults.unit).unwrap_or_default(),
         frame: "as in the file".into(),
         notes: Vec::new(),
     };

@@ -288,7 +288,7 @@ fn check_interface(
     }
     match (input[2], input[3]) {
         (None, None) => Ok(None),
-        (Some(rows), Some(columns)) if (1..=MAX_SIDE).contains(&rows.min(columns)) => {
+        (Some(rows), Some(columns)) if rows.min(columns) >= 1 => {
             if rows.max(columns) > MAX_SIDE {
                 return Err(ModelError::TooLarge {
                     what: "the network's image side, px",

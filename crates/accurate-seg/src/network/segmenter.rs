@@ -48,7 +48,7 @@ pub struct NetworkSegmenter {
     options: NetworkOptions,
 }
 
-/// Most pixels of an image, px: 16384 squared.
+/// Most pixels of an image, padded to what the network takes: 16384 squared.
 const MAX_IMAGE_PX: u64 = 1 << 28;
 
 impl NetworkSegmenter {
@@ -97,19 +97,20 @@ impl NetworkSegmenter {
         watch: &Watch<'_>,
     ) -> Result<Array2<f32>, SegError> {
         let (height, width) = image.dim();
-        if (height as u64).saturating_mul(width as u64) > MAX_IMAGE_PX {
-            return Err(SegError::TooLarge { height, width });
-        }
-        let image = normalise(image, self.manifest.normalisation)?;
         let multiple = self.manifest.network.multiple_px as usize;
         let padded = [height, width].map(|side| side.next_multiple_of(multiple));
         let tiling = self.manifest.tiling;
-        let window = if (padded[0] as u64) * (padded[1] as u64) <= tiling.whole_up_to_px {
+        let window = if (padded[0] as u64).saturating_mul(padded[1] as u64) <= tiling.whole_up_to_px
+        {
             padded
         } else {
             tiling.window_px.map(|side| side as usize)
         };
         let sides = [padded[0].max(window[0]), padded[1].max(window[1])];
+        if (sides[0] as u64).saturating_mul(sides[1] as u64) > MAX_IMAGE_PX {
+            return Err(SegError::TooLarge { height, width, most: MAX_IMAGE_PX });
+        }
+        let image = normalise(image, self.manifest.normalisation)?;
         let padded = extend_to(&image, sides);
         let probability = self.in_windows(&padded.image, window, mirrors, watch)?;
         let [top, left] = padded.before;

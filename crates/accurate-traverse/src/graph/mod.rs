@@ -84,7 +84,8 @@ fn refuse_tangle(view: u8, strands: usize, limit: usize) -> Result<(), TraverseE
 /// # Symmetry
 /// Turning or mirroring the *skeleton* by multiples of 90° does the same to the graph, up to
 /// rounding and the numbers of nodes and edges, as long as no two edges that compete for being
-/// dropped are equally long and equally straight. Turning the *mask* moves the skeleton itself by up
+/// dropped are equally long and equally straight; only where a ring without a junction begins is its first
+/// pixel in the order of rows. Turning the *mask* moves the skeleton itself by up
 /// to about 1 px, as the half-steps of thinning take the south-east before the north-west, and may
 /// split a junction in another way.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,7 +99,8 @@ impl<V: View> SkeletonGraph<V> {
     /// The graph of a skeleton (8-connected, one pixel wide).
     ///
     /// `skeleton` and `radii` have shape (height, width), index `[[y, x]]`; `radii` is the distance
-    /// from pixel centre to the nearest background centre, px, read on the skeleton only.
+    /// from pixel centre to the nearest background centre, px: positive on the skeleton, 0 outside the
+    /// mask. Around the skeleton it tells how far tips reach and where the body is wider.
     /// `mask_thickness_px` is the width of the strands of the mask, px.
     ///
     /// # Errors

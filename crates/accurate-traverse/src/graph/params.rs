@@ -95,6 +95,11 @@ impl GraphParams {
                 return Err(TraverseError::InvalidParameter { name, value, expected });
             }
         }
+        if self.snap_px < 1.0 {
+            let (name, value) = ("snap_px", self.snap_px);
+            let expected = "1 px at least: an edge is cut between two of its points";
+            return Err(TraverseError::InvalidParameter { name, value, expected });
+        }
         for value in self.smooth_sigma_px {
             if !(0.0..=100.0).contains(&value) {
                 let (name, expected) = ("smooth_sigma_px", "0 to 100 px");

@@ -2,6 +2,7 @@
 
 use accurate_geom::{Pixel, View};
 
+use super::beam::Found;
 use super::prices::EdgePrices;
 use super::turns::Turns;
 use super::{Decision, HalfEdge, PointFlags, Walk, WalkCost, WalkEnd};
@@ -17,7 +18,11 @@ pub(super) struct Priced {
 }
 
 /// The price of a walk, from scratch.
-pub(super) fn price(turns: &Turns, prices: &[EdgePrices], halves: Vec<u32>) -> Priced {
+pub(super) fn price(
+    turns: &Turns,
+    prices: &[EdgePrices],
+    Found { halves, closed }: Found,
+) -> Priced {
     let mut cost = WalkCost::default();
     let mut uses = vec![0u8; prices.len()];
     halves.iter().for_each(|&half| uses[half as usize / 2] += 1);
@@ -28,44 +33,25 @@ pub(super) fn price(turns: &Turns, prices: &[EdgePrices], halves: Vec<u32>) -> P
         cost.links += price.link[uses];
         cost.missed_reward += price.missed_reward[uses];
     }
-    for_each_turn(turns, &halves, |came, ahead, left| {
+    for_each_turn(turns, &halves, closed, |came, ahead, left| {
         let price = turns.price(came, ahead, left);
         let part =
             if left == super::turns::reverse(came) { &mut cost.u_turns } else { &mut cost.bending };
         *part += price;
     });
-    let closed = is_closed(turns, &halves);
-    if closed {
-        cost.bending += turns.bend(&ahead_at_end(turns, &halves), halves[0]);
-    } else {
+    if !closed {
         let ends = [turns.from[halves[0] as usize], turns.to[halves[halves.len() - 1] as usize]];
         cost.ends = ends.iter().map(|&node| turns.ending[node as usize]).sum();
     }
     Priced { halves, cost, closed, uses }
 }
 
-/// Whether the walk is cheaper closed than with two ends at the node where it starts and ends.
-pub(super) fn is_closed(turns: &Turns, halves: &[u32]) -> bool {
-    let (Some(&first), Some(&last)) = (halves.first(), halves.last()) else { return false };
-    let node = turns.from[first as usize];
-    node == turns.to[last as usize]
-        && !turns.tip[node as usize]
-        && turns.bend(&ahead_at_end(turns, halves), first) < 2.0 * turns.ending[node as usize]
-}
-
-fn ahead_at_end(turns: &Turns, halves: &[u32]) -> nalgebra::Vector2<f64> {
-    let mut ahead = turns.exit[halves[0] as usize];
-    for pair in halves.windows(2) {
-        ahead = turns.carry(pair[0], &ahead, pair[1]);
-    }
-    ahead
-}
-
 /// Calls `visit` with the half-edge that led to each node, the direction remembered there, and the
-/// half-edge taken.
+/// half-edge taken; in the end at the node where a closed walk closes.
 fn for_each_turn(
     turns: &Turns,
     halves: &[u32],
+    closed: bool,
     mut visit: impl FnMut(u32, &nalgebra::Vector2<f64>, u32),
 ) {
     let mut ahead = turns.exit[halves[0] as usize];
@@ -73,12 +59,15 @@ fn for_each_turn(
         visit(pair[0], &ahead, pair[1]);
         ahead = turns.carry(pair[0], &ahead, pair[1]);
     }
+    if closed {
+        visit(halves[halves.len() - 1], &ahead, halves[0]);
+    }
 }
 
 pub(super) fn assemble<V: View>(graph: &SkeletonGraph<V>, turns: &Turns, walk: Priced) -> Walk<V> {
     let Priced { halves, cost, closed, uses } = walk;
     let mut decisions = Vec::with_capacity(halves.len());
-    for_each_turn(turns, &halves, |came, ahead, left| {
+    for_each_turn(turns, &halves, closed, |came, ahead, left| {
         let node = turns.to[came as usize];
         let alternatives = turns
             .leaving(node)

@@ -1,13 +1,13 @@
 //! Beam search for the cheapest walks.
 
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::BTreeMap;
 
 use nalgebra::Vector2;
 
 use super::WalkParams;
 use super::prices::EdgePrices;
-use super::turns::Turns;
+use super::turns::{Turns, reverse};
 
 /// A partial walk. Its edges are in the arena; how often it used each edge is in a slab beside it.
 #[derive(Debug, Clone, Copy)]
@@ -76,16 +76,22 @@ impl Uses {
     }
 }
 
-/// The half-edge sequences of the cheapest walks, cheapest first, with repetitions (backwards, or
-/// closed walks from another start).
-pub(super) fn search(turns: &Turns, prices: &[EdgePrices], params: &WalkParams) -> Vec<Vec<u32>> {
-    // A walk and its reverse are both found; a closed one from several starts.
-    let wanted = 3 * params.walks;
+/// A walk that was found.
+#[derive(Debug)]
+pub(super) struct Found {
+    pub halves: Vec<u32>,
+    /// Whether it is cheaper closed than with two ends at the node where it starts and ends.
+    pub closed: bool,
+}
+
+/// The cheapest walks, cheapest first; a walk and its reverse are one, and so are the starts of a closed
+/// one.
+pub(super) fn search(turns: &Turns, prices: &[EdgePrices], params: &WalkParams) -> Vec<Found> {
     let nothing: f64 = prices.iter().map(|p| p.total[0]).sum();
     let nothing_least: f64 = prices.iter().map(|p| p.least[0]).sum();
     let words = prices.len().div_ceil(32);
     let mut arena: Vec<(u32, u32)> = Vec::new();
-    let mut finished: BinaryHeap<Finished> = BinaryHeap::new();
+    let mut cheapest = Cheapest::new(params.walks);
     let mut beam: Vec<State> = Vec::new();
     let mut uses = Uses { words, bits: Vec::new() };
     let unused = Uses { words, bits: vec![0; words] };
@@ -110,19 +116,12 @@ pub(super) fn search(turns: &Turns, prices: &[EdgePrices], params: &WalkParams) 
     let mut steps: Vec<Step> = Vec::new();
     for _ in 1..=params.max_steps {
         for state in &beam {
-            let Some(total) = total(turns, state) else { continue };
-            if finished.len() < wanted {
-                finished.push(Finished { total, entry: state.entry });
-            } else if let Some(mut worst) = finished.peek_mut()
-                && total < worst.total
-            {
-                *worst = Finished { total, entry: state.entry };
+            if let Some((total, closed)) = total(turns, state) {
+                let finished = Finished { total, entry: state.entry };
+                cheapest.take_in(finished, closed, || halves_to(&arena, state.entry));
             }
         }
-        let limit = match finished.peek() {
-            Some(worst) if finished.len() == wanted => worst.total,
-            _ => f64::INFINITY,
-        };
+        let limit = cheapest.limit();
         steps.clear();
         for (parent, state) in beam.iter().enumerate() {
             for &half in turns.leaving(turns.to[state.half as usize]) {
@@ -135,7 +134,9 @@ pub(super) fn search(turns: &Turns, prices: &[EdgePrices], params: &WalkParams) 
                 let paid = state.paid + turns.price(state.half, &state.ahead, half);
                 let edges_least = state.edges_least + price.least[used + 1] - price.least[used];
                 let key = paid + edges_least;
-                if key >= limit {
+                // A walk that closes gets back what its start has cost; bends cost nothing at least.
+                let start = turns.from[state.first as usize];
+                if key - turns.ending[start as usize] >= limit {
                     continue;
                 }
                 let edges = state.edges + price.total[used + 1] - price.total[used];
@@ -166,34 +167,83 @@ pub(super) fn search(turns: &Turns, prices: &[EdgePrices], params: &WalkParams) 
         beam = next;
         uses = next_uses;
     }
-    finished
-        .into_sorted_vec()
-        .into_iter()
-        .map(|walk| {
-            let mut halves = Vec::new();
-            let mut entry = walk.entry;
-            while entry != u32::MAX {
-                let (parent, half) = arena[entry as usize];
-                halves.push(half);
-                entry = parent;
-            }
-            halves.reverse();
-            halves
-        })
-        .collect()
+    cheapest.found.into_values().collect()
 }
 
-/// What the walk costs if it ends here, if it may.
-fn total(turns: &Turns, state: &State) -> Option<f64> {
+/// The half-edges of a walk up to an entry of the arena.
+fn halves_to(arena: &[(u32, u32)], mut entry: u32) -> Vec<u32> {
+    let mut halves = Vec::new();
+    while entry != u32::MAX {
+        let (parent, half) = arena[entry as usize];
+        halves.push(half);
+        entry = parent;
+    }
+    halves.reverse();
+    halves
+}
+
+/// What the walk costs if it ends here, if it may, and whether it is closed then.
+fn total(turns: &Turns, state: &State) -> Option<(f64, bool)> {
     if turns.link[state.half as usize] {
         return None;
     }
     let (start, end) = (turns.from[state.first as usize], turns.to[state.half as usize]);
     let open = turns.ending[end as usize];
-    let closing = if start == end && !turns.tip[end as usize] {
-        turns.bend(&state.ahead, state.first) - turns.ending[start as usize]
-    } else {
-        f64::INFINITY
-    };
-    Some(state.paid + state.edges + open.min(closing))
+    let closing = turns
+        .closing(state.first, state.half, &state.ahead)
+        .map(|price| price - turns.ending[start as usize])
+        .filter(|price| *price < open);
+    Some((state.paid + state.edges + closing.unwrap_or(open), closing.is_some()))
+}
+
+/// The cheapest of the walks that were finished so far, each once.
+struct Cheapest {
+    most: usize,
+    found: BTreeMap<Finished, Found>,
+    /// By [`canonical`] half-edges.
+    known: BTreeMap<Vec<u32>, Finished>,
+}
+
+impl Cheapest {
+    fn new(most: usize) -> Self {
+        Self { most, found: BTreeMap::new(), known: BTreeMap::new() }
+    }
+
+    /// What a walk has to be cheaper than.
+    fn limit(&self) -> f64 {
+        match self.found.last_key_value() {
+            Some((dearest, _)) if self.found.len() == self.most => dearest.total,
+            _ => f64::INFINITY,
+        }
+    }
+
+    fn take_in(&mut self, finished: Finished, closed: bool, halves: impl FnOnce() -> Vec<u32>) {
+        if finished.total >= self.limit() {
+            return;
+        }
+        let halves = halves();
+        let canonical = canonical(&halves, closed);
+        if let Some(same) = self.known.get(&canonical) {
+            if same.total <= finished.total {
+                return;
+            }
+            self.found.remove(same);
+        } else if self.found.len() == self.most
+            && let Some((_, dearest)) = self.found.pop_last()
+        {
+            self.known.remove(&self::canonical(&dearest.halves, dearest.closed));
+        }
+        self.known.insert(canonical, finished);
+        self.found.insert(finished, Found { halves, closed });
+    }
+}
+
+/// The same for a walk and its reverse, and for every start of a closed walk.
+fn canonical(halves: &[u32], closed: bool) -> Vec<u32> {
+    let backward: Vec<u32> = halves.iter().rev().map(|&half| reverse(half)).collect();
+    let starts = if closed { halves.len() } else { 1 };
+    let rotations = (0..starts).flat_map(|start| {
+        [halves, &backward[..]].map(|walk| [&walk[start..], &walk[..start]].concat())
+    });
+    rotations.min().unwrap_or_default()
 }

@@ -6,8 +6,6 @@ mod params;
 mod prices;
 mod turns;
 
-use std::collections::BTreeSet;
-
 use accurate_geom::{Pixel, View};
 
 pub use params::WalkParams;
@@ -106,7 +104,7 @@ pub struct Walk<V: View> {
     pub cost: WalkCost,
     /// How the walk starts and ends.
     pub ends: [WalkEnd; 2],
-    /// One entry per node passed.
+    /// One entry per node passed; of a closed walk in the end the one where it closes.
     pub decisions: Vec<Decision<V>>,
     /// Part of the body's length walked along, 0 to 1.
     pub coverage: f64,
@@ -172,28 +170,10 @@ pub fn k_best_walks_with_reward<V: View>(
     let turns = Turns::new(graph, params);
     let prices = prices::prices(graph, params, rewards);
     let found = beam::search(&turns, &prices, params);
-    let mut seen = BTreeSet::new();
-    let mut priced = Vec::new();
-    for halves in found {
-        let closed = assemble::is_closed(&turns, &halves);
-        if !seen.insert(canonical(&halves, closed)) {
-            continue;
-        }
-        priced.push(assemble::price(&turns, &prices, halves));
-    }
+    let mut priced: Vec<_> =
+        found.into_iter().map(|walk| assemble::price(&turns, &prices, walk)).collect();
     priced.sort_by(|a, b| {
         a.cost.total().total_cmp(&b.cost.total()).then_with(|| a.halves.cmp(&b.halves))
     });
-    priced.truncate(params.walks);
     Ok(priced.into_iter().map(|walk| assemble::assemble(graph, &turns, walk)).collect())
-}
-
-/// The same for a walk and its reverse, and for every start of a closed walk.
-fn canonical(halves: &[u32], closed: bool) -> Vec<u32> {
-    let backward: Vec<u32> = halves.iter().rev().map(|&half| turns::reverse(half)).collect();
-    let starts = if closed { halves.len() } else { 1 };
-    let rotations = (0..starts).flat_map(|start| {
-        [halves, &backward[..]].map(|walk| [&walk[start..], &walk[..start]].concat())
-    });
-    rotations.min().unwrap_or_default()
 }

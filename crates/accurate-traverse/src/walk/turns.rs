@@ -122,8 +122,18 @@ impl Turns {
         }
     }
 
+    /// The price of going on along the first half-edge again at the end of a walk whose last one is `last`:
+    /// it closes the walk. `None` if it may not, or ends elsewhere.
+    pub fn closing(&self, first: u32, last: u32, ahead: &Vector2<f64>) -> Option<f64> {
+        let node = self.to[last as usize];
+        let closes = node == self.from[first as usize]
+            && !self.tip[node as usize]
+            && self.allows(last, first);
+        closes.then(|| self.price(last, ahead, first))
+    }
+
     /// The price of the bend alone.
-    pub fn bend(&self, ahead: &Vector2<f64>, half: u32) -> f64 {
+    fn bend(&self, ahead: &Vector2<f64>, half: u32) -> f64 {
         let out = &self.out[half as usize];
         if *out == Vector2::zeros() || *ahead == Vector2::zeros() {
             return 0.0;

@@ -58,7 +58,7 @@ pub(super) fn expected_error(
         })
         .collect();
     let sigma = params.smoothing_share * (n - 1) as f64;
-    let reach = (3.0 * sigma).ceil() as usize;
+    let reach = ((3.0 * sigma).ceil() as usize).min(n);
     let prior = 1.0 / (PRIOR_SHARE * length).powi(2);
     let (mut sum, mut max) = (0.0, 0f64);
     for i in 0..n {

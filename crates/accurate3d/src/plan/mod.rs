@@ -157,11 +157,7 @@ pub fn plan_views(
         let expected = "a grid of at most a million views";
         return Err(PlanError::BadParameter { name: "views", value: cells, expected });
     }
-    let line = Polyline3::new(shape.to_vec())?;
-    if !(line.length() > 0.0) {
-        return Err(PlanError::NoLength);
-    }
-    let shape = line.resample_to(SAMPLES)?;
+    let shape = evenly(shape)?;
     let shape = shape.points();
     let seen = shape.iter().filter(|x| sees(first, x)).count();
     if (seen as f64) < LEAST_SEEN * shape.len() as f64 {
@@ -186,13 +182,23 @@ pub fn plan_views(
 /// The camera of the second view at these angles, degrees; what [`plan_views`] reckons with.
 ///
 /// # Errors
-/// None in practice: a turned rotation is a rotation.
+/// [`PlanError`] for a shape without two points apart.
 pub fn second_camera(
     shape: &[Point3],
     first: &Camera,
     angles_deg: [f64; 2],
 ) -> Result<Camera, PlanError> {
-    Ok(Orbit::of(first, shape).camera(first, angles_deg)?)
+    let shape = evenly(shape)?;
+    Ok(Orbit::of(first, shape.points()).camera(first, angles_deg)?)
+}
+
+/// The shape in steps of equal length: where its vertices crowd says nothing.
+fn evenly(shape: &[Point3]) -> Result<Polyline3, PlanError> {
+    let line = Polyline3::new(shape.to_vec())?;
+    if !(line.length() > 0.0) {
+        return Err(PlanError::NoLength);
+    }
+    Ok(line.resample_to(SAMPLES)?)
 }
 
 fn planned(
@@ -278,10 +284,14 @@ fn steps(name: &'static str, [low, high]: [f64; 2], step: f64) -> Result<Vec<f64
             return Err(PlanError::BadParameter { name, value, expected });
         }
     }
-    let count = ((high - low) / step + 1e-9).floor();
-    if !(0.0..=MOST_VIEWS).contains(&count) {
+    if low > high {
         let expected = "a range from its least to its greatest value";
         return Err(PlanError::BadParameter { name, value: high - low, expected });
+    }
+    let count = ((high - low) / step + 1e-9).floor();
+    if count > MOST_VIEWS {
+        let expected = "steps that give a grid of at most a million views";
+        return Err(PlanError::BadParameter { name: "step_deg", value: step, expected });
     }
     Ok((0..=count as u32).map(|i| low + step * f64::from(i)).collect())
 }
@@ -305,6 +315,36 @@ mod tests {
                 Point3::new(30.0 * (3.0 * s).sin(), 25.0 * s * s, 80.0 * (s - 0.5))
             })
             .collect()
+    }
+
+    #[test]
+    fn where_vertices_crowd_is_no_matter_to_where_a_camera_turns() {
+        let k = Matrix3::new(1800.0, 0.0, 256.0, 0.0, 1800.0, 256.0, 0.0, 0.0, 1.0);
+        let size = ImageSize { width: 512, height: 512 };
+        // Looks at no isocentre.
+        let first =
+            Camera::new(k, Matrix3::identity(), Vector3::new(7.0, 3.0, 900.0), size).unwrap();
+        let even: Vec<Point3> = (0..=100).map(|x| Point3::new(f64::from(x), 0.0, 0.0)).collect();
+        let mut crowded: Vec<Point3> =
+            (0..200).map(|k| Point3::new(f64::from(k) * 0.005, 0.0, 0.0)).collect();
+        crowded.push(Point3::new(100.0, 0.0, 0.0));
+        let centre =
+            |shape: &[Point3]| second_camera(shape, &first, [30.0, 10.0]).unwrap().centre();
+        assert!((centre(&even) - centre(&crowded)).norm() < 1e-9);
+        let point = [Point3::origin(); 3];
+        assert!(second_camera(&point, &first, [30.0, 10.0]).is_err());
+    }
+
+    #[test]
+    fn any_share_of_smoothing_gives_an_error_and_a_step_that_is_too_fine_is_named() {
+        let (shape, first) = (bow(), c_arm(0.0, 0.0));
+        let coarse = PlanParams { step_deg: 45.0, ..PlanParams::DEFAULT };
+        let wide = PlanParams { smoothing_share: 1e20, ..coarse };
+        let plan = plan_views(&shape, &first, &wide).unwrap();
+        assert!(plan.views.iter().any(|view| view.expected_mean.is_some()));
+        let fine = PlanParams { step_deg: 1e-5, ..coarse };
+        let refused = plan_views(&shape, &first, &fine).unwrap_err().to_string();
+        assert!(refused.contains("step_deg"), "{refused}");
     }
 
     #[test]

@@ -68,8 +68,9 @@ impl CaseSet {
         self.len() == 0
     }
 
-    /// BLAKE3 hash of every case's cameras, points, masks, images and truth, so that two machines can
-    /// tell whether they measured the same data.
+    /// BLAKE3 hash of every case's cameras, points, masks and truth, and of the images of given pairs, so
+    /// that two machines can tell whether they measured the same data. Those of generated cases are drawn
+    /// from the rest, by the version that a table's manifest names.
     ///
     /// # Errors
     /// [`Error::Synthesis`] if a case cannot be generated.
@@ -197,7 +198,8 @@ const NOT_SEGMENTED: &str = "ask for --input image";
 /// a case is done.
 ///
 /// # Errors
-/// [`Error::Synthesis`] if a case cannot be generated, [`Error::Scoring`] if a mean cannot be formed.
+/// [`Error::Synthesis`] if a case cannot be generated, [`Error::Scoring`] if a mean cannot be formed,
+/// [`Error::MixedUnits`] if the pairs are in different units.
 /// A method that fails on a case is counted in its row, not an error here.
 pub fn measure(
     set: &CaseSet,
@@ -224,6 +226,10 @@ pub fn measure(
             Ok((pair.rig.unit(), scores))
         })
         .collect::<Result<_, Error>>()?;
+    let unit = per_case.first().map_or(LengthUnit::Unit, |(unit, _)| *unit);
+    if let Some((other, _)) = per_case.iter().find(|(other, _)| *other != unit) {
+        return Err(Error::MixedUnits { set: set.name(), units: [unit, *other] });
+    }
     let mut measured = Vec::new();
     for column in 0..runnable(rows, how).count() {
         let (mut scored, mut failures) = (Vec::new(), Vec::new());
@@ -247,12 +253,7 @@ pub fn measure(
             },
         })
         .collect();
-    Ok(Table {
-        set: set.name(),
-        cases: set.len(),
-        unit: per_case.first().map_or(LengthUnit::Unit, |(unit, _)| *unit),
-        rows,
-    })
+    Ok(Table { set: set.name(), cases: set.len(), unit, rows })
 }
 
 fn runnable<'r>(

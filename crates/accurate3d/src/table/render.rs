@@ -198,8 +198,12 @@ fn csv(table: &Table) -> String {
         String::from("set,cases,unit,label,input,metric,paper,value,low,high,scored,failed,note\n");
     for row in &table.rows {
         let lead = format!(
-            "{},{},{},\"{}\",{}",
-            table.set, table.cases, table.unit, row.row.label, row.row.input
+            "{},{},{},{},{}",
+            quoted(&table.set),
+            table.cases,
+            table.unit,
+            quoted(row.row.label),
+            row.row.input
         );
         for column in column_names(table) {
             let paper = paper_value(table, row, column).map_or_else(String::new, |v| v.to_string());
@@ -225,9 +229,27 @@ fn csv(table: &Table) -> String {
     text
 }
 
+/// A name in CSV: a path may hold a comma, and a quote.
+fn quoted(name: &str) -> String {
+    format!("\"{}\"", name.replace('"', "\"\""))
+}
+
+/// A character as LaTeX sets it.
+fn latex_of(character: char) -> String {
+    match character {
+        '%' | '&' | '_' | '#' | '$' | '{' | '}' => format!("\\{character}"),
+        '\\' => "\\textbackslash{}".to_owned(),
+        '~' => "\\textasciitilde{}".to_owned(),
+        '^' => "\\textasciicircum{}".to_owned(),
+        '<' => "$<$".to_owned(),
+        '>' => "$>$".to_owned(),
+        other => other.to_string(),
+    }
+}
+
 fn latex(table: &Table) -> String {
     let (header, rows) = grid(table);
-    let escape = |s: &String| s.replace('%', "\\%").replace('&', "\\&").replace('<', "$<$");
+    let escape = |s: &String| s.chars().map(latex_of).collect::<String>();
     let line = |cells: &[String]| {
         format!("{} \\\\\n", cells.iter().map(escape).collect::<Vec<_>>().join(" & "))
     };
@@ -322,4 +344,30 @@ fn to_json(table: &Table) -> Value {
         "caption": caption(table),
         "rows": rows,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::LengthUnit;
+
+    use super::*;
+
+    #[test]
+    fn a_set_may_have_any_name() {
+        let name = "runs/my_set, \"50 %\" & more";
+        let table = Table {
+            set: name.to_owned(),
+            cases: 0,
+            unit: LengthUnit::Millimetre,
+            rows: Vec::new(),
+        };
+        assert_eq!(quoted(&table.set), "\"runs/my_set, \"\"50 %\"\" & more\"");
+        let tex = latex(&table);
+        assert!(tex.contains("runs/my\\_set, \"50 \\%\" \\& more"), "{tex}");
+        let special: String = "\\~^<>{}#$".chars().map(latex_of).collect();
+        assert_eq!(
+            special,
+            "\\textbackslash{}\\textasciitilde{}\\textasciicircum{}$<$$>$\\{\\}\\#\\$"
+        );
+    }
 }
