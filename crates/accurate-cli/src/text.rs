@@ -1,3 +1,4 @@
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use accurate3d::io::write_atomically;
@@ -51,13 +52,17 @@ pub fn check_folder(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Refuses an output file that is one of those `read`.
+/// The places of files that are there, by which one is told under any name.
+pub fn places<'p>(files: impl IntoIterator<Item = &'p PathBuf>) -> BTreeSet<PathBuf> {
+    files.into_iter().filter_map(|path| path.canonicalize().ok()).collect()
+}
+
+/// Refuses an output file that stands at one of the [`places`] that are `read`.
 ///
 /// # Errors
 /// [`Failure::USAGE`].
-pub fn refuse_what_is_read(written: &Path, read: &[PathBuf]) -> Result<(), Failure> {
-    let Ok(written_to) = written.canonicalize() else { return Ok(()) };
-    if read.iter().any(|path| path.canonicalize().is_ok_and(|path| path == written_to)) {
+pub fn refuse_what_is_read(written: &Path, read: &BTreeSet<PathBuf>) -> Result<(), Failure> {
+    if written.canonicalize().is_ok_and(|place| read.contains(&place)) {
         let message = format!("{} is read, and would be replaced", written.display());
         return Err(
             Failure::new(Failure::USAGE, message).with_hint("give another place for the results")

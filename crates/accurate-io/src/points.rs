@@ -8,8 +8,8 @@ use crate::bounded::{MAX_POINTS_BYTES, read_bytes};
 use crate::matrix::{finite, parse_number};
 
 /// Reads ordered centreline points (`points_L.csv`) of view `V`: a header with the columns `x` and
-/// `y` in px, then one point per line, in order. Other columns are ignored, but with a column `z` it is a curve
-/// in space and refused. Points may lie outside the image.
+/// `y` in px, then one point per line, in order. Other columns are ignored, but with a column `z` it is a
+/// curve in space, and refused. Points may lie outside the image.
 ///
 /// # Errors
 /// [`IoError::NotANumber`] or [`IoError::NotFinite`] with line and column; [`IoError::Malformed`]

@@ -67,8 +67,7 @@ fn examined(args: &DoctorArgs) -> Result<([NamedView; 2], Option<Seen>), Failure
         return Err(usage("--matched, --points and --masks are three kinds of the same: give one"));
     }
     let named = !kinds.iter().all(|files| files.is_empty());
-    let folders = !args.files.is_empty()
-        && args.files.iter().all(|f| f.is_dir() && !f.join("cameras.txt").is_file());
+    let folders = args.files.iter().all(|f| f.is_dir() && !f.join("cameras.txt").is_file());
     if folders {
         let (views, seen) = of_pair_folders(&args.files)?;
         let seen = if named { of_files(args, &views)? } else { seen };

@@ -1,3 +1,4 @@
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use accurate3d::io::{is_curve_file, remove_unfinished, write_curve, write_json};
@@ -92,7 +93,7 @@ impl Outputs {
     }
 
     /// Refuses, before the work, places that cannot be written to, and those of files that are read.
-    pub fn check(&self, read: &[PathBuf]) -> Result<(), Failure> {
+    pub fn check(&self, read: &BTreeSet<PathBuf>) -> Result<(), Failure> {
         let mut written = self.files.clone();
         if let Some(folder) = &self.folder {
             check_folder(folder)?;

@@ -19,6 +19,7 @@ use crate::code::Code;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::segmentation::segmenter;
+use crate::text::places;
 use crate::two_views::{are_files, files_behind, pair_of_files};
 
 /// What one run reads.
@@ -34,7 +35,7 @@ enum Source {
 pub fn run(args: &ReconstructArgs, config: &str, console: &Console) -> Result<(), Failure> {
     refuse_what_takes_no_effect(args)?;
     let jobs = jobs(args, config)?;
-    let read = everything_read(args, &jobs);
+    let read = places(&everything_read(args, &jobs));
     for (_, outputs) in &jobs {
         outputs.check(&read)?;
     }

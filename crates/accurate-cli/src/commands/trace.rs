@@ -8,13 +8,13 @@ use accurate3d::traverse::{TraverseParams, trace_single};
 use crate::args::TraceArgs;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::{make_place, refuse_what_is_read, write_text};
+use crate::text::{make_place, places, refuse_what_is_read, write_text};
 
 /// `accurate trace`: a mask's skeleton in order, as `x,y` lines.
 pub fn run(args: &TraceArgs, console: &Console) -> Result<(), Failure> {
     if let Some(path) = &args.out {
         make_place(path)?;
-        refuse_what_is_read(path, std::slice::from_ref(&args.mask))?;
+        refuse_what_is_read(path, &places([&args.mask]))?;
     }
     let of_mask = |failure: Failure| failure.of_file(&args.mask);
     let mask = Mask::from_array(read_mask(&args.mask)?).map_err(|e| of_mask(e.into()))?;
