@@ -26,7 +26,8 @@ pub struct CyclicAlignment {
 /// cost independent of where both sequences are cut.
 ///
 /// # Cost
-/// O(n1·n2·log n2) time, 9 bytes per cell of memory.
+/// O(n1·n2·log n2) time, 9 bytes per cell of memory; up to O(n1·n2²) time where infinite costs forbid
+/// many beginnings.
 pub fn align_cyclic(
     n1: usize,
     n2: usize,

@@ -12,7 +12,8 @@ use crate::body_end::free_length;
 pub struct CentrelineParams {
     /// Standard deviation of the points per coordinate, px. Rounding to integers: 1/sqrt(12).
     pub sigma_px: f64,
-    /// Distance of the points of the result at most, px.
+    /// Distance of the points of the result, px, along the chords of the given points: in tight bends some
+    /// are up to an eighth farther apart.
     pub spacing_px: f64,
 }
 
@@ -27,7 +28,7 @@ impl Default for CentrelineParams {
     }
 }
 
-/// The smoothest curve that the noise of the points allows, as points at most
+/// The smoothest curve that the noise of the points allows, as points about
 /// [`CentrelineParams::spacing_px`] apart.
 ///
 /// `points` are in order; equal neighbours count once. Fewer than four different points come back as
@@ -71,9 +72,9 @@ pub fn smooth_centreline<V: View>(
 ///
 /// `radii` is the distance to the background, px, shape (height, width), 0 outside of the mask. A
 /// point moves to the centroid of the pixels around it, weighted by their radius and tapered to 0 at
-/// `w/2 + 2` px from it, along the normal of the line only; at most 1 px. Points where the mask is
-/// more than 1 px wider than `mask_thickness_px` (crossings, strands side by side) and points outside
-/// of the mask stay. Thick masks gain most: their skeleton wavers by a pixel, their middle does not.
+/// `w/2 + 2` px from it, along the normal of the line only; at most 1 px, twice. Points where the mask is
+/// more than 1 px wider than `mask_thickness_px` (crossings, strands side by side) stay, and so do those
+/// that see no mask from where they are; from just outside of it they are drawn in. Thick masks gain most: their skeleton wavers by a pixel, their middle does not.
 ///
 /// # Errors
 /// [`TraverseError::InvalidParameter`] for a thickness that is not positive.

@@ -113,8 +113,9 @@ pub struct DoctorArgs {
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The second view has the optics and distances of the first. A DICOM C-arm turns about its isocentre,
-and the angles are its own; any other camera turns about the middle of the shape, from (0, 0).")]
+The second view has the optics and distances of the first. A camera that looks at the world's origin, as
+a DICOM C-arm at its isocentre, turns about it, and the angles are its own; any other camera turns about
+the middle of the shape, from (0, 0).")]
 pub struct PlanArgs {
     /// The body as far as it is known: a curve file (csv, ply, vtp, npy, mrk.json), points in order,
     /// in the world of the first view.
