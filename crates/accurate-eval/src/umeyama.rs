@@ -1,5 +1,5 @@
 use accurate_geom::Point3;
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use crate::{EvalError, check};
 
@@ -107,22 +107,16 @@ fn align(
         covariance += t * s.transpose() * *w;
         source_variance += s.norm_squared() * w;
     }
-    // Not that of a 3 x 3 matrix, which goes by the square of the matrix and of small ratios leaves noise.
-    let svd = DMatrix::from_column_slice(3, 3, covariance.as_slice()).svd(true, true);
-    let singular = Vector3::from_column_slice(svd.singular_values.as_slice());
-    let spread_ratio = if singular[0] > 0.0 { (singular[1] / singular[0]).sqrt() } else { 0.0 };
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return collinear(spread_ratio) };
-    let [u, v_t] = [u, v_t].map(|m| Matrix3::from_column_slice(m.as_slice()));
+    let [(first, u0, v0), (second, u1, v1)] = singular_pairs(&covariance);
+    let spread_ratio = if first > 0.0 { (second / first).sqrt() } else { 0.0 };
     if spread_ratio < LEAST_SPREAD_RATIO {
         return collinear(spread_ratio);
     }
-    let mut signs = Vector3::repeat(1.0);
-    if u.determinant() * v_t.determinant() < 0.0 {
-        signs.z = -1.0;
-    }
-    let rotation = u * Matrix3::from_diagonal(&signs) * v_t;
+    // The third axes follow from the others, for a rotation mirrors nothing.
+    let axes = |a: Vector3<f64>, b: Vector3<f64>| Matrix3::from_columns(&[a, b, a.cross(&b)]);
+    let rotation = axes(u0, u1) * axes(v0, v1).transpose();
     let scale = if scaled {
-        singular.dot(&signs) / source_variance * (target_size / source_size)
+        rotation.dot(&covariance) / source_variance * (target_size / source_size)
     } else {
         1.0
     };
@@ -137,6 +131,46 @@ fn align(
         .sum();
     let rms = check::result("root mean square of an alignment", squared.sqrt())?;
     Ok(Alignment { target_from_source, rms, spread_ratio })
+}
+
+/// The two largest singular values of a matrix with their left and right unit vectors.
+///
+/// By one-sided Jacobi rotations, which find small singular values as exactly as the matrix holds them; a
+/// decomposition by the matrix's square leaves noise where the second is below 1e-6 of the first.
+fn singular_pairs(matrix: &Matrix3<f64>) -> [(f64, Vector3<f64>, Vector3<f64>); 2] {
+    /// Each sweep squares what is left; four are enough.
+    const MOST_SWEEPS: usize = 30;
+    let mut columns = [0, 1, 2].map(|k| matrix.column(k).into_owned());
+    let mut right = [Vector3::x(), Vector3::y(), Vector3::z()];
+    for _ in 0..MOST_SWEEPS {
+        let mut at_rest = true;
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            let (a, b) = (columns[p], columns[q]);
+            let shared = a.dot(&b);
+            if shared.abs() <= f64::EPSILON * a.norm() * b.norm() {
+                continue;
+            }
+            at_rest = false;
+            let zeta = (b.norm_squared() - a.norm_squared()) / (2.0 * shared);
+            let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
+            let cosine = 1.0 / tangent.hypot(1.0);
+            let sine = cosine * tangent;
+            for pair in [&mut columns, &mut right] {
+                let (a, b) = (pair[p], pair[q]);
+                pair[p] = cosine * a - sine * b;
+                pair[q] = sine * a + cosine * b;
+            }
+        }
+        if at_rest {
+            break;
+        }
+    }
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| columns[b].norm_squared().total_cmp(&columns[a].norm_squared()));
+    [order[0], order[1]].map(|k| {
+        let norm = columns[k].norm();
+        (norm, columns[k] / norm.max(f64::MIN_POSITIVE), right[k])
+    })
 }
 
 /// Weights with sum 1.
