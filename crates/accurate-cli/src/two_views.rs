@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use accurate3d::InputKind;
-use accurate3d::geom::Camera;
 use accurate3d::io::{
     FrameChoice, NamedView, Pair, PairParts, ViewDefaults, ViewFiles, is_dicom, pair_files,
     pair_of_views, read_cameras, read_curve, read_grey,
@@ -11,7 +10,6 @@ use accurate3d::io::{
 use ndarray::Array2;
 
 use crate::args::{ReconstructArgs, ViewArgs};
-use crate::code::Code;
 use crate::dicom_child;
 use crate::failure::Failure;
 use crate::units::common_unit;
@@ -90,26 +88,6 @@ pub fn named(views: &[NamedView], name: &str) -> Result<NamedView, Failure> {
 
 fn names(views: &[NamedView]) -> String {
     views.iter().map(|view| view.name.as_str()).collect::<Vec<_>>().join(", ")
-}
-
-/// Refuses a mask, rows and columns, of another size than its camera's image.
-pub fn refuse_other_size(
-    path: &Path,
-    (rows, columns): (usize, usize),
-    camera: &Camera,
-) -> Result<(), Failure> {
-    let size = camera.size();
-    if (columns, rows) == (size.width as usize, size.height as usize) {
-        return Ok(());
-    }
-    let message = format!(
-        "{}: {columns} x {rows} pixels, but its camera's image is {} x {}",
-        path.display(),
-        size.width,
-        size.height
-    );
-    Err(Failure::new(Code::SizeMismatch, message)
-        .with_hint("masks and images must have the size the cameras are for"))
 }
 
 /// Whether the inputs are the files of two views rather than pair folders.

@@ -1,5 +1,5 @@
 use accurate_geom::nalgebra::{Matrix2, Matrix3, Vector2};
-use accurate_geom::{Camera, Curve3, Rig};
+use accurate_geom::{Curve3, Rig};
 
 use crate::adaptive::fit_posterior;
 use crate::minimise::Priors;
@@ -77,10 +77,7 @@ impl CalibrationEstimate {
         k[(1, 2)] += self.shift_px[1];
         let (s, c) = self.roll_rad.sin_cos();
         let roll = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
-        let mut camera2 = Camera::new(k, roll * camera.r(), roll * camera.t(), camera.size())?;
-        if let Some(lens) = camera.distortion() {
-            camera2 = camera2.with_distortion(*lens)?;
-        }
+        let camera2 = camera.with_matrices(k, roll * camera.r(), roll * camera.t())?;
         Ok(Rig::new(rig.camera1().clone(), camera2, rig.unit())?)
     }
 

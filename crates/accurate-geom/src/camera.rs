@@ -101,6 +101,19 @@ impl Camera {
         Ok(Self { distortion: Some(distortion), ..self })
     }
 
+    /// The camera with another `k`, `r` and `t`, and the same image size and lens.
+    ///
+    /// # Errors
+    /// As [`Camera::new`].
+    pub fn with_matrices(
+        &self,
+        k: Matrix3<f64>,
+        r: Matrix3<f64>,
+        t: Vector3<f64>,
+    ) -> Result<Self, GeomError> {
+        Ok(Self { distortion: self.distortion, ..Self::new(k, r, t, self.size)? })
+    }
+
     /// The lens distortion, if any.
     pub fn distortion(&self) -> Option<&Distortion> {
         self.distortion.as_ref()

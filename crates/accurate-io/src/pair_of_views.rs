@@ -7,7 +7,7 @@ use crate::cameras::NamedView;
 use crate::distortion::undistort_points;
 use crate::image_file::{read_grey, read_mask};
 use crate::meta::check_case_id;
-use crate::pair::{Pair, check_size};
+use crate::pair::Pair;
 use crate::points::read_points;
 use crate::{IoError, read_curve};
 
@@ -83,8 +83,7 @@ pub fn pair_of_views(
                 .to_owned();
             return Err(IoError::Unsupported { path: paths[index].clone(), what });
         }
-        let name = PathBuf::from(format!("camera `{}`", views[index].name));
-        check_size(&paths[index], dim, &name, size[index])
+        views[index].check_size(&paths[index], dim)
     };
     match files {
         ViewFiles::Points(_) => {

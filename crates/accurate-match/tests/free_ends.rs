@@ -320,17 +320,23 @@ fn free_lengths_are_kept() {
 
 /// View 2 goes on for 20 samples, of which 4 may be left out. The path leaves out those 4 and matches 16
 /// with the last point of view 1; of these all but the few within the slack are left out as well.
-#[test]
-fn a_run_at_a_free_end_is_left_out_beyond_the_free_length() {
+/// A straight wire of which view 2 sees 20 px more at its end. Epipolar lines are rows; samples are 1 px apart
+/// along the curves and 0.1 px across the lines.
+fn a_longer_second_view() -> (Rig, Vec<Pixel<View1>>, Vec<Pixel<View2>>) {
     let k = Matrix3::new(1000.0, 0.0, 256.0, 0.0, 1000.0, 256.0, 0.0, 0.0, 1.0);
     let size = ImageSize { width: 512, height: 512 };
     let camera =
         |x: f64| Camera::new(k, Matrix3::identity(), Vector3::new(x, 0.0, 0.0), size).unwrap();
-    // Epipolar lines are rows. Samples are 1 px apart along the curves and 0.1 px across the lines.
     let rig = Rig::new(camera(0.0), camera(-10.0), LengthUnit::Unit).unwrap();
     let at = |k: u32| (0.99_f64.sqrt() * f64::from(k), 0.1 * f64::from(k));
-    let c1: Vec<_> = (0..60).map(|k| Pixel::new(300.0 + at(k).0, 200.0 + at(k).1)).collect();
-    let c2: Vec<_> = (0..80).map(|k| Pixel::new(200.0 + at(k).0, 200.0 + at(k).1)).collect();
+    let c1 = (0..60).map(|k| Pixel::new(300.0 + at(k).0, 200.0 + at(k).1)).collect();
+    let c2 = (0..80).map(|k| Pixel::new(200.0 + at(k).0, 200.0 + at(k).1)).collect();
+    (rig, c1, c2)
+}
+
+#[test]
+fn a_run_at_a_free_end_is_left_out_beyond_the_free_length() {
+    let (rig, c1, c2) = a_longer_second_view();
     let params = FreeMatchParams {
         prices: MovePrices { end_skip: 0.06, ..TRUSTING.prices },
         free1: FreeEnds::NONE,
@@ -352,14 +358,7 @@ fn a_run_at_a_free_end_is_left_out_beyond_the_free_length() {
 #[test]
 fn an_end_that_is_seen_is_kept_though_its_point_stands_twice_and_a_free_one_is_free_however_short()
 {
-    let k = Matrix3::new(1000.0, 0.0, 256.0, 0.0, 1000.0, 256.0, 0.0, 0.0, 1.0);
-    let size = ImageSize { width: 512, height: 512 };
-    let camera =
-        |x: f64| Camera::new(k, Matrix3::identity(), Vector3::new(x, 0.0, 0.0), size).unwrap();
-    let rig = Rig::new(camera(0.0), camera(-10.0), LengthUnit::Unit).unwrap();
-    let at = |k: u32| (0.99_f64.sqrt() * f64::from(k), 0.1 * f64::from(k));
-    let c1: Vec<_> = (0..60).map(|k| Pixel::new(300.0 + at(k).0, 200.0 + at(k).1)).collect();
-    let mut c2: Vec<_> = (0..80).map(|k| Pixel::new(200.0 + at(k).0, 200.0 + at(k).1)).collect();
+    let (rig, c1, mut c2) = a_longer_second_view();
     c2.push(c2[79]);
     let matched2 = |end_px: f64| {
         let params = FreeMatchParams {

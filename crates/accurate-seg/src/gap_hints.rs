@@ -166,7 +166,7 @@ fn search(
             let price = if is_own {
                 0.0
             } else {
-                0.05 - f64::from(probability[next].clamp(params.least, 1.0)).ln()
+                0.05 - f64::from(probability[next].max(params.least).min(1.0)).ln()
             };
             let cost = cost + step * price;
             if best.get(&next).is_none_or(|(known, ..)| cost < *known) {

@@ -50,9 +50,12 @@ fn curve(rig: &Rig, masks: [Array2<bool>; 2]) -> (Vec<Point3>, bool) {
     (found.positions(), found.diagnostics.suspicions.contains(&Suspicion::Ambiguous))
 }
 
-/// Every case's mean distance between the two curves stays below the tolerance, and so does the largest
-/// unless one of the results says itself that it could be another curve.
-fn assert_same(other: impl Fn(&Rig, &[Array2<bool>; 2]) -> (Vec<Point3>, bool)) {
+/// Every case's largest and mean distance between the two curves stays below the tolerance. Of `tied` two
+/// curves are as likely: there the largest may be more, and one of the results has to say so.
+fn assert_same(
+    tied: Option<(Family, u64)>,
+    other: impl Fn(&Rig, &[Array2<bool>; 2]) -> (Vec<Point3>, bool),
+) {
     // Among those that differ most of the first 16 of each.
     for (family, index) in [
         (Family::Easy, 13),
@@ -69,13 +72,14 @@ fn assert_same(other: impl Fn(&Rig, &[Array2<bool>; 2]) -> (Vec<Point3>, bool)) 
         let (there, ambiguous_there) = other(&case.rig, &case.masks);
         let scores = curve_scores(&there, &here, 0.5 * unit_per_px).unwrap();
         let [largest, mean] = [scores.hausdorff, scores.overall].map(|d| d / unit_per_px);
-        let is_same = largest < LARGEST_PX || ambiguous_here || ambiguous_there;
+        let said = tied == Some((family, index)) && (ambiguous_here || ambiguous_there);
+        let is_same = largest < LARGEST_PX || said;
         assert!(is_same && mean < MEAN_PX, "{family} {index}: {largest} {mean}");
     }
 }
 
-fn assert_same_turned(turn: Turn) {
-    assert_same(|rig, masks| {
+fn assert_same_turned(turn: Turn, tied: Option<(Family, u64)>) {
+    assert_same(tied, |rig, masks| {
         let cameras = [rig.camera1(), rig.camera2()].map(|camera| turn.camera(camera));
         let [one, two] = cameras;
         let rig = Rig::new(one, two, rig.unit()).unwrap();
@@ -93,20 +97,20 @@ const MEAN_PX: f64 = 0.1;
 
 #[test]
 fn mirrored_images_give_the_same_curve() {
-    assert_same_turned(Turn::MirrorX);
+    assert_same_turned(Turn::MirrorX, None);
 }
 
 #[test]
 fn transposed_images_give_the_same_curve() {
-    assert_same_turned(Turn::Transpose);
+    assert_same_turned(Turn::Transpose, None);
 }
 
 #[test]
 fn images_turned_by_90_degrees_give_the_same_curve() {
-    assert_same_turned(Turn::Rotate90);
+    assert_same_turned(Turn::Rotate90, Some((Family::Hard, 6)));
 }
 
 #[test]
 fn swapped_views_give_the_same_curve() {
-    assert_same(|rig, [one, two]| curve(&rig.swapped(), [two.clone(), one.clone()]));
+    assert_same(None, |rig, [one, two]| curve(&rig.swapped(), [two.clone(), one.clone()]));
 }

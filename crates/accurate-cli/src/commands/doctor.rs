@@ -16,7 +16,7 @@ use crate::args::DoctorArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::text::{has_extension, make_place};
-use crate::two_views::{refuse_other_size, two_cameras};
+use crate::two_views::two_cameras;
 
 /// `accurate camera doctor`: what is wrong with two cameras, by what was seen with them.
 pub fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
@@ -110,7 +110,7 @@ fn of_files(args: &DoctorArgs, views: &[NamedView; 2]) -> Result<Option<Seen>, F
         curves.push([points_of(&files[0])?, points_of(&files[1])?]);
     }
     for files in args.masks.chunks_exact(2) {
-        curves.push([traced(&files[0], &views[0].camera)?, traced(&files[1], &views[1].camera)?]);
+        curves.push([traced(&files[0], &views[0])?, traced(&files[1], &views[1])?]);
     }
     Ok((!curves.is_empty()).then_some(Seen::Curves(curves)))
 }
@@ -167,9 +167,9 @@ fn points_of(path: &Path) -> Result<Vec<Point2>, Failure> {
     Ok(read_points::<View1>(path)?.iter().map(|p| p.point()).collect())
 }
 
-fn traced(path: &Path, camera: &Camera) -> Result<Vec<Point2>, Failure> {
+fn traced(path: &Path, view: &NamedView) -> Result<Vec<Point2>, Failure> {
     let mask = read_mask(path)?;
-    refuse_other_size(path, mask.dim(), camera)?;
+    view.check_size(path, mask.dim())?;
     traced_mask(mask).map_err(|failure| failure.of_file(path))
 }
 

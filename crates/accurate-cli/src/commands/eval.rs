@@ -12,7 +12,7 @@ use crate::args::EvalArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::text::has_extension;
-use crate::two_views::{cameras_of, refuse_other_size};
+use crate::two_views::cameras_of;
 use crate::units::common_unit;
 
 /// `accurate eval`: the paper's scores and the point-to-polyline ones, as JSON.
@@ -77,7 +77,7 @@ fn third_view(
             .map_err(|e| Failure::new(Failure::BAD_INPUT, format!("{}: {e}", seen.display())))?
     } else {
         let mask = read_mask(seen)?;
-        refuse_other_size(seen, mask.dim(), &view.camera)?;
+        view.check_size(seen, mask.dim())?;
         let skeleton = Skeleton::of(&zhang_suen(&Mask::from_array(mask)?))?;
         skeleton.pixels_as::<View1>().iter().map(|p| p.point()).collect()
     };

@@ -10,7 +10,8 @@ use crate::args::{Extra, ReconstructArgs};
 use crate::failure::Failure;
 use crate::raster::write_picture;
 use crate::text::{
-    check_folder, check_output, make_folder, refuse_what_is_read, remove_file, write_text,
+    check_folder, check_output, make_folder, make_place, refuse_what_is_read, remove_file,
+    write_text,
 };
 
 /// Where the results of a command go: at most one folder, and single files.
@@ -115,9 +116,7 @@ impl Outputs {
         result: &Value,
     ) -> Result<(), Failure> {
         for file in &self.files {
-            if let Some(parent) = file.parent().filter(|p| !p.as_os_str().is_empty()) {
-                make_folder(parent)?;
-            }
+            make_place(file)?;
             write_one(file, pair, reconstruction, result)?;
         }
         if let Some(folder) = &self.folder {

@@ -1,7 +1,7 @@
 use accurate_geom::nalgebra::Vector2;
 use ndarray::{Array2, Axis, Slice};
 
-use super::fit::IntensityFitParams;
+use super::params::IntensityFitParams;
 use super::smooth::weighted_mean;
 use crate::FitError;
 

@@ -5,6 +5,8 @@ mod band;
 mod dense_normal;
 mod drawing;
 mod fit;
+mod params;
 mod smooth;
 
-pub use fit::{IntensityFit, IntensityFitParams, IntensityPair, fit_intensities};
+pub use fit::{IntensityFit, IntensityPair, fit_intensities};
+pub use params::IntensityFitParams;

@@ -1,10 +1,11 @@
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use accurate_geom::nalgebra::{Matrix3, Vector3};
 use accurate_geom::{Camera, Distortion, ImageSize, LengthUnit};
 use serde::{Deserialize, Serialize};
 
 use crate::IoError;
+use crate::pair::check_size;
 use crate::unit::length_unit;
 
 /// One camera read from a file, with what its numbers mean.
@@ -20,6 +21,17 @@ pub struct NamedView {
     pub frame: String,
     /// What was assumed, or converted, to get here. Nothing is assumed without a line in it.
     pub notes: Vec<String>,
+}
+
+impl NamedView {
+    /// Refuses a picture, rows and columns of it, that has not the size of the camera's image.
+    ///
+    /// # Errors
+    /// [`IoError::SizeMismatch`] with the picture's `path`.
+    pub fn check_size(&self, path: &Path, dim: (usize, usize)) -> Result<(), IoError> {
+        let camera = PathBuf::from(format!("camera `{}`", self.name));
+        check_size(path, dim, &camera, self.camera.size())
+    }
 }
 
 /// What some formats leave out and the caller may know.

@@ -208,9 +208,5 @@ fn median(mut values: Vec<f64>) -> f64 {
 pub(super) fn scaled(camera: &Camera, px: f64) -> Option<Camera> {
     let mut scale = Matrix3::identity() / px;
     scale[(2, 2)] = 1.0;
-    let other = Camera::new(scale * camera.k(), *camera.r(), *camera.t(), camera.size()).ok()?;
-    match camera.distortion() {
-        Some(lens) => other.with_distortion(*lens).ok(),
-        None => Some(other),
-    }
+    camera.with_matrices(scale * camera.k(), *camera.r(), *camera.t()).ok()
 }

@@ -305,11 +305,7 @@ impl Mistake {
 
 /// The camera with other numbers and the same lens and size.
 fn with(camera: &Camera, k: Matrix3<f64>, r: Matrix3<f64>, t: Vector3<f64>) -> Option<Camera> {
-    let other = Camera::new(k, r, t, camera.size()).ok()?;
-    match camera.distortion() {
-        Some(lens) => other.with_distortion(*lens).ok(),
-        None => Some(other),
-    }
+    camera.with_matrices(k, r, t).ok()
 }
 
 /// `K` of the image mirrored in one direction, whose side is `side` px.
