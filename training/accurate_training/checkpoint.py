@@ -8,7 +8,7 @@ import torch
 from .atomic import write_atomically
 from .configuration import TrainConfig
 
-FORMAT = 1
+FORMAT = 2
 
 
 class CheckpointError(RuntimeError):
@@ -26,6 +26,8 @@ class Checkpoint:
     config: TrainConfig
     step: int
     network: dict
+    # The running average of its weights, which is what leaves the run.
+    average: dict
     optimizer: dict
     pool_names: list[str]
     pool_at: dict[int, int]

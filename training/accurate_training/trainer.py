@@ -20,6 +20,7 @@ from .losses import composite_loss
 from .metrics import score_mask
 from .network import build_network
 from .predict import THRESHOLD, wire_probability
+from .running_average import RunningAverage
 from .schedule import learning_rate
 from .shards import ShardError, ShardPool
 
@@ -60,6 +61,8 @@ class Trainer:
         self.optimizer = torch.optim.AdamW(
             self.network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
         )
+        # What is validated and exported; a network of its own, since the other one goes on learning.
+        self.average = RunningAverage(self.network, config.average_decay)
         if checkpoint is not None:
             self._restore(checkpoint)
         self._stop_asked = False
@@ -94,6 +97,7 @@ class Trainer:
                     row = self._learn(batches.pop(self.step).result())
                     steps_curve.append(step=self.step, **row, seconds=time.monotonic() - began)
                     self.step += 1
+                    self.average.update(self.network, self.step)
                     if self.step % self.config.validate_steps == 0 or self.step == self.config.steps:
                         self._validate(validation_curve)
                     if time.monotonic() - saved > checkpoint_seconds:
@@ -111,6 +115,7 @@ class Trainer:
             config=self.config,
             step=self.step,
             network=self.network.state_dict(),
+            average=self.average.weights,
             optimizer=self.optimizer.state_dict(),
             pool_names=list(self.pool.names),
             pool_at=dict(self.pool_at),
@@ -155,9 +160,11 @@ class Trainer:
     def _validate(self, curve: Curve) -> None:
         if not self.validation:
             return
-        self.network.eval()
+        network = build_network(self.config.width, self.config.seed)
+        network.load_state_dict(self.average.weights)
+        network.to(memory_format=torch.channels_last).eval()
         scores = [
-            score_mask(wire_probability(self.network, image, bfloat16=self.config.bfloat16) >= THRESHOLD, mask)
+            score_mask(wire_probability(network, image, bfloat16=self.config.bfloat16) >= THRESHOLD, mask)
             for image, mask in self.validation
         ]
         found = [score for score in scores if not score.failed]
@@ -193,6 +200,7 @@ class Trainer:
                 f"the first ones in {', '.join(map(str, self.pool.folders))}"
             )
         self.network.load_state_dict(checkpoint.network)
+        self.average.weights = checkpoint.average
         self.optimizer.load_state_dict(checkpoint.optimizer)
         torch.set_rng_state(checkpoint.torch_rng)
         self.step, self.pool_at = checkpoint.step, dict(checkpoint.pool_at)
@@ -205,7 +213,7 @@ class Trainer:
         other = Checkpoint.load(path)
         if other.config.width != self.config.width:
             raise CheckpointError(f"weights of width {other.config.width} do not fit width {self.config.width}")
-        self.network.load_state_dict(other.network)
+        self.network.load_state_dict(other.average)
         self.inherited_steps = other.inherited_steps + other.step
 
     def _ask_stop(self, *_: object) -> None:
