@@ -3,7 +3,9 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use accurate3d::io::{FrameChoice, NamedView, read_dicom_pixels, read_dicom_view};
+use accurate3d::io::{
+    FrameChoice, NamedView, is_dicom, read_dicom_pixels, read_dicom_view, read_grey,
+};
 use ndarray::Array2;
 use serde_json::{Value, json};
 
@@ -53,8 +55,13 @@ pub fn read_view(path: &Path) -> Result<NamedView, Failure> {
     Ok(NamedView::from_json(path, &String::from_utf8_lossy(&said))?)
 }
 
+/// A frame of a DICOM run, or the picture of an image file.
+pub fn read_picture(path: &Path, choice: FrameChoice) -> Result<Array2<f32>, Failure> {
+    if is_dicom(path)? { read_frame(path, choice) } else { Ok(read_grey(path)?.values) }
+}
+
 /// A frame of a DICOM file through its window, 0 to 255, read by such a child.
-pub fn read_frame(path: &Path, choice: FrameChoice) -> Result<Array2<f32>, Failure> {
+fn read_frame(path: &Path, choice: FrameChoice) -> Result<Array2<f32>, Failure> {
     let word = match choice {
         FrameChoice::Mean => "mean".to_owned(),
         FrameChoice::One(index) => index.to_string(),

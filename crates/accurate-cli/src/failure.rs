@@ -190,6 +190,10 @@ impl From<Error> for Failure {
             Error::Name(_) => Self::new(Self::BAD_INPUT, message),
             Error::MixedUnits { .. } => Self::new(Self::BAD_INPUT, message)
                 .with_hint("measure pairs in one unit at a time: `unit` in meta.json says which"),
+            Error::OtherSize { .. } => Self::new(Code::SizeMismatch, message),
+            Error::PointOutside { .. } => Self::new(Code::SizeMismatch, message).with_hint(
+                "points are pixels (x, y) of the picture that image_size and K stand for: were they scaled, cropped or swapped?",
+            ),
             Error::Synthesis(_) => Self::new(Self::USAGE, message),
             _ => Self::new(Self::INTERNAL, message),
         }

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use accurate3d::InputKind;
 use accurate3d::io::{
     FrameChoice, NamedView, Pair, PairParts, ViewDefaults, ViewFiles, is_dicom, pair_files,
-    pair_of_views, read_cameras, read_curve, read_grey,
+    pair_of_views, read_cameras, read_curve,
 };
-use ndarray::Array2;
 
 use crate::args::{ReconstructArgs, ViewArgs};
 use crate::dicom_child;
@@ -147,7 +146,8 @@ pub fn pair_of_files(args: &ReconstructArgs) -> Result<(Pair, Vec<PathBuf>), Fai
         InputKind::Mask => ViewFiles::Masks(paths),
         InputKind::Image if dicom.contains(&true) => {
             let [first, second] = frame_choices(&args.frame);
-            let frames = [frame_of(one, dicom[0], first)?, frame_of(two, dicom[1], second)?];
+            let frames =
+                [dicom_child::read_picture(one, first)?, dicom_child::read_picture(two, second)?];
             ViewFiles::Frames(paths, frames)
         }
         InputKind::Image => ViewFiles::Images(paths),
@@ -189,8 +189,4 @@ fn frame_choices(frames: &[u32]) -> [FrameChoice; 2] {
         [both] => [FrameChoice::One(*both); 2],
         [one, two, ..] => [FrameChoice::One(*one), FrameChoice::One(*two)],
     }
-}
-
-fn frame_of(path: &Path, dicom: bool, choice: FrameChoice) -> Result<Array2<f32>, Failure> {
-    if dicom { dicom_child::read_frame(path, choice) } else { Ok(read_grey(path)?.values) }
 }

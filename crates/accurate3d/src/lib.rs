@@ -60,10 +60,12 @@ mod reasons;
 mod reconstruct;
 mod reconstruction;
 mod report;
+mod require;
 mod robust;
 mod sampled_curve;
 mod segment;
 pub mod table;
+mod trace_mask;
 mod unrolled;
 
 pub use careful_look::{CarefulLook, reconstruct_images};
@@ -82,6 +84,7 @@ pub use reconstruction::{Reconstruction, Traces};
 pub use report::{Provenance, report_html};
 pub use robust::{DoubtLimits, Evidence, RobustParams, SecondLook, Suspicion};
 pub use segment::segment_images;
+pub use trace_mask::{MaskTrace, trace_mask};
 
 /// The statement that stands in every report: this is research software.
 pub const NOT_FOR_CLINICAL_USE: &str = "Research software: not for clinical use.";

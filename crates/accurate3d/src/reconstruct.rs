@@ -10,6 +10,7 @@ use ndarray::Array2;
 
 use crate::direction::runs_against;
 use crate::ordered_points::adjusted_points;
+use crate::require::{require_one_size, require_points_inside, require_segmented};
 use crate::robust::{reconstruct_masks, without_strays};
 use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled, sampled_ring};
 use crate::{
@@ -150,6 +151,9 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
         require_segmented(pair)?;
     }
     require_one_size(pair)?;
+    if params.input == InputKind::Points {
+        require_points_inside(pair)?;
+    }
     match (params.method, params.input) {
         (Method::Accurate, InputKind::Mask | InputKind::Image) => {
             return joint_choice(pair, params);
@@ -196,35 +200,6 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
         diagnostics,
         explanation: Explanation::default(),
     })
-}
-
-fn require_segmented(pair: &ViewPair) -> Result<(), Error> {
-    match (&pair.images, &pair.probabilities) {
-        (_, Some(_)) => Ok(()),
-        (Some(_), None) => Err(Error::NotSegmented { case: pair.id.clone() }),
-        (None, None) => Err(Error::MissingInput { case: pair.id.clone(), input: InputKind::Image }),
-    }
-}
-
-/// What belongs to a view has the size of its camera's image.
-fn require_one_size(pair: &ViewPair) -> Result<(), Error> {
-    let cameras = [pair.rig.camera1(), pair.rig.camera2()];
-    for (view, camera) in cameras.into_iter().enumerate() {
-        let size = camera.size();
-        let expected = (size.height as usize, size.width as usize);
-        let found = [
-            ("mask", pair.masks.as_ref().map(|both| both[view].dim())),
-            ("image", pair.images.as_ref().map(|both| both[view].dim())),
-            ("probability map", pair.probabilities.as_ref().map(|both| both[view].dim())),
-        ];
-        for (what, found) in found {
-            if let Some(found) = found.filter(|found| *found != expected) {
-                let (case, view) = (pair.id.clone(), view as u8 + 1);
-                return Err(Error::OtherSize { case, view, what, found, expected });
-            }
-        }
-    }
-    Ok(())
 }
 
 /// Our own method on masks, and on the maps that they were made of.

@@ -132,6 +132,25 @@ fn points_of_another_scene_are_unexplained_and_too_few_are_refused() {
     assert!(diagnose(&scene.cameras, MM, &empty).is_err());
 }
 
+#[test]
+fn curves_whose_points_are_in_no_order_are_refused() {
+    let (cameras, seen) = wire(Family::Medium, 0);
+    let Seen::Curves(curves) = seen else { panic!("curves were asked for") };
+    let [one, two] = &curves[0];
+    // Neighbours in the list are far apart on the body.
+    let shuffled = |points: &[Point2]| -> Vec<Point2> {
+        let stride = (points.len() / 3..).find(|s| gcd(*s, points.len()) == 1).unwrap();
+        (0..points.len()).map(|i| points[i * stride % points.len()]).collect()
+    };
+    let spoiled = Seen::Curves(vec![[one.clone(), shuffled(two)]]);
+    let error = diagnose(&cameras, MM, &spoiled).unwrap_err();
+    assert!(matches!(error, DoctorError::Tangled { view: 2, times } if times > 20.0), "{error}");
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
 /// A generated wire as ordered curves, and its cameras.
 fn wire(family: Family, index: u64) -> ([Camera; 2], Seen) {
     let case = generate(family, 1, index, &CaseOptions::default()).unwrap();

@@ -17,7 +17,7 @@ pub use self::camera::{
 };
 pub use self::figure::{DemoArgs, FigureArgs};
 pub use self::grey::GreyArgs;
-pub use self::reconstruct::{Extra, ReconstructArgs, TraceArgs};
+pub use self::reconstruct::{Extra, ReconstructArgs, TraceArgs, TraceMethod};
 pub use self::segment::{EngineChoice, ImportArgs, Mirror, ModelArgs, ModelCommand, SegmentArgs};
 pub use self::synth::{
     CasesArgs, Disturbances, PointsKind, SynthArgs, SynthCommand, XrayArgs, XrayGenerator,
@@ -39,11 +39,12 @@ pub struct Cli {
     pub command: Command,
 
     /// Say less: errors only.
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    // The later one wins: the command line over the config file, whose words come first.
+    #[arg(short, long, global = true, overrides_with = "verbose")]
     pub quiet: bool,
 
     /// Say more; repeat for more still.
-    #[arg(short, long, global = true, action = ArgAction::Count)]
+    #[arg(short, long, global = true, action = ArgAction::Count, overrides_with = "quiet")]
     pub verbose: u8,
 
     /// Print machine-readable JSON instead of prose on stdout.

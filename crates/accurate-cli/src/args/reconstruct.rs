@@ -89,10 +89,22 @@ impl Extra {
     }
 }
 
+/// How the skeleton of one mask is put in order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TraceMethod {
+    /// The cheapest walk along the whole body, between the pixels.
+    Accurate,
+    /// Greedy traversal of the published method (GCTT), pixel by pixel.
+    Paper,
+}
+
 #[derive(Debug, Args)]
 pub struct TraceArgs {
     /// The mask image; any non-zero pixel is foreground.
     pub mask: PathBuf,
+    /// How pixels are put in order.
+    #[arg(short, long, value_enum, default_value_t = TraceMethod::Accurate)]
+    pub method: TraceMethod,
     /// Write the ordered points `x,y` here instead of to stdout.
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,

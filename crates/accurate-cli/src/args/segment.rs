@@ -45,9 +45,12 @@ pub enum EngineChoice {
 
 #[derive(Debug, Args)]
 pub struct SegmentArgs {
-    /// Grey images of 8 or 16 bits: PNG, JPEG, TIFF, PNM, BMP.
+    /// Grey images of 8 or 16 bits (PNG, JPEG, TIFF, PNM, BMP) or DICOM runs.
     #[arg(required = true, value_name = "IMAGE")]
     pub images: Vec<PathBuf>,
+    /// Frame of DICOM runs, from 0 (default: the mean over all frames, for bodies at rest).
+    #[arg(long, value_name = "INDEX")]
+    pub frame: Option<u32>,
     /// Folder for NAME_mask.png, NAME_probability.png (16 bits), NAME_overlay.png and
     /// NAME_centreline.csv (the ridge of the probability between the pixels, with the width there).
     #[arg(short, long, value_name = "DIR")]

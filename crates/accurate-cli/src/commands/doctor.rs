@@ -8,11 +8,11 @@ use accurate3d::geom::{Camera, LengthUnit, Point2, Rig, View1};
 use accurate3d::io::{
     NamedView, PairParts, Truth, find_pairs, read_mask, read_pair, read_points, write_rig,
 };
-use accurate3d::seg::{Mask, Skeleton, zhang_suen};
-use accurate3d::traverse::{TraverseParams, trace_single};
+use ndarray::Array2;
 use serde_json::{Value, json};
 
-use crate::args::DoctorArgs;
+use super::trace::ordered;
+use crate::args::{DoctorArgs, TraceMethod};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::text::{has_extension, make_place};
@@ -69,6 +69,17 @@ fn examined(args: &DoctorArgs) -> Result<([NamedView; 2], Option<Seen>), Failure
     let named = !kinds.iter().all(|files| files.is_empty());
     let folders = args.files.iter().all(|f| f.is_dir() && !f.join("cameras.txt").is_file());
     if folders {
+        let stated = [
+            ("--views", !args.views.is_empty()),
+            ("--image-size", args.stated.image_size.is_some()),
+            ("--unit", args.stated.unit.is_some()),
+        ];
+        if let Some((option, _)) = stated.into_iter().find(|(_, given)| *given) {
+            return Err(usage(&format!(
+                "{option} is for camera files; a pair folder says it itself"
+            ))
+            .with_hint("leave it out, or name the camera files and what was seen with them"));
+        }
         let (views, seen) = of_pair_folders(&args.files)?;
         let seen = if named { of_files(args, &views)? } else { seen };
         return Ok((views, seen));
@@ -143,8 +154,7 @@ fn of_pair_folders(folders: &[PathBuf]) -> Result<([NamedView; 2], Option<Seen>)
                 let plain1 = one.iter().map(|p| p.point()).collect();
                 curves.push([plain1, two.iter().map(|p| p.point()).collect()]);
             } else if let Some(masks) = pair.masks {
-                let [one, two] = masks;
-                curves.push([traced_mask(one)?, traced_mask(two)?]);
+                curves.push([traced_mask(&masks[0])?, traced_mask(&masks[1])?]);
             }
         }
     }
@@ -170,13 +180,11 @@ fn points_of(path: &Path) -> Result<Vec<Point2>, Failure> {
 fn traced(path: &Path, view: &NamedView) -> Result<Vec<Point2>, Failure> {
     let mask = read_mask(path)?;
     view.check_size(path, mask.dim())?;
-    traced_mask(mask).map_err(|failure| failure.of_file(path))
+    traced_mask(&mask).map_err(|failure| failure.of_file(path))
 }
 
-fn traced_mask(mask: ndarray::Array2<bool>) -> Result<Vec<Point2>, Failure> {
-    let skeleton = Skeleton::of(&zhang_suen(&Mask::from_array(mask)?))?;
-    let trace = trace_single(&skeleton.pixels_as::<View1>(), &TraverseParams::PAPER)?;
-    Ok(trace.points.iter().map(|p| p.point()).collect())
+fn traced_mask(mask: &Array2<bool>) -> Result<Vec<Point2>, Failure> {
+    Ok(ordered(mask, TraceMethod::Accurate)?.points)
 }
 
 fn common_unit(views: &[NamedView; 2]) -> Result<LengthUnit, Failure> {

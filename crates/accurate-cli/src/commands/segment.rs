@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use accurate3d::NOT_FOR_CLINICAL_USE;
-use accurate3d::io::{read_grey, write_mask, write_rgb, write_u16};
+use accurate3d::io::{FrameChoice, is_dicom, write_mask, write_rgb, write_u16};
 use accurate3d::seg::network::{NetworkOptions, NetworkSegmenter};
 use accurate3d::seg::{
     Components, Mask, Polarity, PostProcessing, RidgeParams, RidgePoint, Segmenter,
@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 
 use crate::args::SegmentArgs;
 use crate::console::Console;
+use crate::dicom_child::read_picture;
 use crate::failure::Failure;
 use crate::segmentation::segmenter_with;
 use crate::text::{make_folder, write_text};
@@ -25,6 +26,7 @@ const WEAK: f32 = 0.6;
 pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
     let jobs = jobs(args)?;
     let polarity = args.grey.polarity();
+    let frame = frame(args)?;
     let segmenter = segmenter_with(&args.model, console, |options, own| NetworkOptions {
         postprocessing: args.threshold.map(|high| PostProcessing { low: WEAK * high, high, ..own }),
         ..options
@@ -33,7 +35,7 @@ pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
     let bar = console.progress(jobs.len(), "segmenting");
     let (mut failed, mut first_failure) = (0, None);
     for (image, name) in &jobs {
-        match one(image, name, &args.out, polarity, &segmenter) {
+        match one(image, frame, name, &args.out, polarity, &segmenter) {
             Ok(report) if console.json => console.json(&report)?,
             Ok(report) => console.data(&line(&report))?,
             Err(failure) => {
@@ -77,14 +79,27 @@ fn jobs(args: &SegmentArgs) -> Result<Vec<(PathBuf, String)>, Failure> {
     Ok(jobs)
 }
 
+/// Which frame of DICOM runs.
+fn frame(args: &SegmentArgs) -> Result<FrameChoice, Failure> {
+    let Some(index) = args.frame else { return Ok(FrameChoice::Mean) };
+    // What cannot be opened is told when its turn comes.
+    if !args.images.iter().any(|image| is_dicom(image).unwrap_or(true)) {
+        let message = format!("--frame {index}, with no DICOM run");
+        return Err(Failure::new(Failure::USAGE, message)
+            .with_hint("only DICOM runs have frames: leave --frame out"));
+    }
+    Ok(FrameChoice::One(index))
+}
+
 fn one(
     path: &Path,
+    frame: FrameChoice,
     name: &str,
     out: &Path,
     polarity: Polarity,
     segmenter: &NetworkSegmenter,
 ) -> Result<Value, Failure> {
-    let image = read_grey(path)?.values;
+    let image = read_picture(path, frame)?;
     let found = segmenter.segment(&polarity.with_body_dark(image.clone()), &unwatched)?;
     let skeleton = zhang_suen(&found.mask);
     let width = if found.mask.is_empty() { None } else { Some(median_width_px(&found.mask)?) };

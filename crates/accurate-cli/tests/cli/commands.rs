@@ -241,6 +241,25 @@ fn trace_orders_a_mask() {
 }
 
 #[test]
+fn a_trace_says_what_it_decided_and_the_published_one_keeps_to_pixels() {
+    let mask = samples().join("bend/masks/mask_L.png");
+    let run = |more: &[&str]| -> serde_json::Value {
+        let mut command = accurate();
+        command.args(["--json", "trace"]).arg(&mask).args(more);
+        serde_json::from_str(&stdout(&mut command)).unwrap()
+    };
+    let is_whole = |point: &serde_json::Value| {
+        (0..2).all(|axis| point[axis].as_f64().is_some_and(|value| value.fract() == 0.0))
+    };
+    let (walk, greedy) = (run(&[]), run(&["--method", "paper"]));
+    assert_eq!((&walk["method"], &greedy["method"]), (&"accurate".into(), &"paper".into()));
+    assert!(walk["coverage"].as_f64().unwrap() > 0.95 && walk["closed"] == false);
+    assert!(walk["junctions"].is_array() && walk["bridges"] == 0);
+    assert!(greedy["points"].as_array().unwrap().iter().all(is_whole));
+    assert!(!walk["points"].as_array().unwrap().iter().all(is_whole));
+}
+
+#[test]
 fn tables_come_in_every_format() {
     for (format, sign) in [
         ("md", "| ---"),

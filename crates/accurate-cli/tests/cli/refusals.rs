@@ -266,3 +266,52 @@ fn what_comes_out_as_a_single_point_is_no_curve() {
     let in_space = |pair: &Path| write(pair.join("points/points_L.csv"), "x,y,z\n1,2,3\n4,5,6\n");
     refuses("points", in_space, 65, &["points_L.csv", "curve in space"]);
 }
+
+#[test]
+fn points_of_a_scaled_picture_are_refused_with_what_may_have_happened() {
+    let dir = TempDir::new().unwrap();
+    let pair = copy_of("bend", dir.path());
+    let path = pair.join("points/points_R.csv");
+    let doubled: String = fs::read_to_string(&path)
+        .unwrap()
+        .lines()
+        .map(|line| match line.split_once(',').map(|(x, y)| (x.parse(), y.parse())) {
+            Some((Ok::<f64, _>(x), Ok::<f64, _>(y))) => format!("{},{}\n", 2.0 * x, 2.0 * y),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    fs::write(&path, doubled).unwrap();
+    let out = dir.path().join("out");
+    let mut run = accurate();
+    let (code, said) =
+        failure(run.args(["reconstruct", "-i", "points", "-o"]).arg(&out).arg(&pair));
+    assert_eq!(code, 65, "{said}");
+    assert!(said.contains("error[A022]") && said.contains("view 2: point"), "{said}");
+    assert!(said.contains("scaled") && !out.exists(), "{said}");
+}
+
+#[test]
+fn what_a_pair_folder_says_itself_is_not_said_again_to_the_doctor() {
+    for (option, value) in [("--views", "l,r"), ("--image-size", "64x64"), ("--unit", "mm")] {
+        let mut doctor = accurate();
+        doctor.args(["camera", "doctor", option, value]).arg(samples().join("bend"));
+        let (code, said) = failure(&mut doctor);
+        assert_eq!(code, 2, "{said}");
+        assert!(said.contains(option) && said.contains("pair folder"), "{said}");
+    }
+}
+
+#[test]
+fn the_later_of_quiet_and_verbose_wins() {
+    let dir = TempDir::new().unwrap();
+    let config = dir.path().join("accurate.toml");
+    fs::write(&config, "quiet = true\n").unwrap();
+    let mask = samples().join("bend/masks/mask_L.png");
+    let remarks = |words: &[&str]| {
+        let mut trace = accurate();
+        trace.arg("--config").arg(&config).args(words).arg("trace").arg(&mask);
+        String::from_utf8(trace.assert().success().get_output().stderr.clone()).unwrap()
+    };
+    assert_eq!(remarks(&[]), "");
+    assert!(remarks(&["-v"]).contains("coverage"));
+}

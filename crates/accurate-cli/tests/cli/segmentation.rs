@@ -310,3 +310,40 @@ fn an_image_that_fails_is_named_also_quietly_and_to_a_program() {
     let first: Value = serde_json::from_str(said.lines().next().unwrap()).unwrap();
     assert_eq!((&first["image"], &first["code"]), (&"nowhere.png".into(), &"A030".into()));
 }
+
+#[test]
+fn a_dicom_run_is_segmented_by_its_mean_or_by_one_frame() {
+    let dir = TempDir::new().unwrap();
+    let model = dark_model(dir.path());
+    // A dark bar across each frame: the mean shows both, half as dark.
+    let side = 128_u16;
+    let frame = |bar: std::ops::Range<u16>| {
+        (0..side).flat_map(move |row| {
+            let value = if bar.contains(&row) { 20_u8 } else { 200 };
+            std::iter::repeat_n(value, usize::from(side))
+        })
+    };
+    let pixels: Vec<u8> = frame(60..64).chain(frame(100..102)).collect();
+    let run = dir.path().join("run.dcm");
+    fs::write(&run, crate::dicom::view([10.0, 0.0], side, &pixels, &[])).unwrap();
+    let segment = |more: &[&str], input: &Path| {
+        let mut command = accurate();
+        command.env_remove("ORT_DYLIB_PATH").args(["--json", "segment", "--model"]).arg(&model);
+        command.args(["--mirror", "never", "-o"]).arg(dir.path().join("out")).args(more).arg(input);
+        command
+    };
+    let body = |more: &[&str]| -> u64 {
+        let report: Value = serde_json::from_str(&stdout(&mut segment(more, &run))).unwrap();
+        assert_eq!(report["size"], serde_json::json!([side, side]));
+        report["body_px"].as_u64().unwrap()
+    };
+    assert_eq!(body(&["--frame", "0"]), 4 * u64::from(side));
+    assert_eq!(body(&["--frame", "1"]), 2 * u64::from(side));
+    assert_eq!(body(&[]), 6 * u64::from(side));
+    let (code, said) = failure(&mut segment(&["--frame", "2"], &run));
+    assert_eq!(code, 65, "{said}");
+    let image = dir.path().join("out/run_probability.png");
+    let (code, said) = failure(&mut segment(&["--frame", "0"], &image));
+    assert_eq!(code, 2, "{said}");
+    assert!(said.contains("no DICOM run"), "{said}");
+}

@@ -38,6 +38,16 @@ pub enum DoctorError {
         /// Its index.
         index: usize,
     },
+    /// Points that are in no order along a body.
+    #[error(
+        "a curve of view {view} is {times:.0} times as long as the box it lies in: its points are in no order"
+    )]
+    Tangled {
+        /// 1 or 2.
+        view: u8,
+        /// Its length over the diagonal of its bounding box.
+        times: f64,
+    },
     /// The cameras as given cannot be used together, and no mistake explains it.
     #[error("the two cameras are no rig: their centres coincide or a lens cannot be undone")]
     NoRig,

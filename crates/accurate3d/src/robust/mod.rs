@@ -25,8 +25,10 @@ mod start;
 mod strays;
 mod suspicion;
 
+pub(crate) use candidates::ViewCandidates;
 pub use evidence::Evidence;
 pub(crate) use finalists::SAME_PX;
+pub(crate) use frame::Turn;
 pub(crate) use joint::{JointResult, reconstruct_masks};
 pub use joint::{RobustParams, SecondLook};
 pub(crate) use shape::px_per_unit;
