@@ -31,7 +31,7 @@ def _train(options: argparse.Namespace) -> None:
     torch.set_num_threads(options.threads)
     config = replace(TrainConfig(), **{
         name: getattr(options, name)
-        for name in ("width", "steps", "seed", "learning_rate", "final_share", "final_batch", "average_decay")
+        for name in ("width", "steps", "seed", "learning_rate", "final_share", "final_batch", "ema_decay")
         if getattr(options, name) is not None
     })
     if options.float32:
@@ -56,7 +56,7 @@ def _export(options: argparse.Namespace) -> None:
 
     checkpoint = Checkpoint.load(options.checkpoint)
     network = build_network(checkpoint.config.width, checkpoint.config.seed)
-    network.load_state_dict(checkpoint.average)
+    network.load_state_dict(checkpoint.ema)
     metadata = {
         "accurate.width": str(checkpoint.config.width),
         STEPS_KEY: str(checkpoint.step + checkpoint.inherited_steps),
@@ -147,7 +147,7 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--final-share", type=float, help="share of the steps at whole images")
     train.add_argument("--final-batch", type=int)
     train.add_argument(
-        "--average-decay", type=float, help="of the running average of the weights that is exported (0: the last ones)"
+        "--ema-decay", type=float, help="decay a step of the moving average of the weights that is exported (0: the last ones)"
     )
     train.add_argument("--dice", type=float, help="weight of a soft Dice term beside the paper's loss (0)")
     train.add_argument(

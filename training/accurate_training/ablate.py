@@ -62,6 +62,6 @@ def checkpoint_segmenter(path: Path) -> Callable[[np.ndarray], np.ndarray]:
     """Image to mask with the weights of a checkpoint, in float32."""
     checkpoint = Checkpoint.load(path)
     network = build_network(checkpoint.config.width, checkpoint.config.seed)
-    network.load_state_dict(checkpoint.average)
+    network.load_state_dict(checkpoint.ema)
     network.eval()
     return lambda image: wire_probability(network, image, bfloat16=False) >= THRESHOLD

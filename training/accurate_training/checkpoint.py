@@ -26,8 +26,8 @@ class Checkpoint:
     config: TrainConfig
     step: int
     network: dict
-    # The running average of its weights, which is what leaves the run.
-    average: dict
+    # The moving average of its weights, which is what leaves the run.
+    ema: dict
     optimizer: dict
     pool_names: list[str]
     pool_at: dict[int, int]
@@ -49,6 +49,9 @@ class Checkpoint:
             raise
         except Exception as error:
             raise CheckpointError(f"{path}: not a checkpoint: {error}") from error
+        if isinstance(state, dict) and state.get("format") == 1:
+            # Before there was an average.
+            state |= {"format": FORMAT, "ema": state.get("network")}
         if not isinstance(state, dict) or state.get("format") != FORMAT:
             found = state.get("format") if isinstance(state, dict) else type(state).__name__
             raise CheckpointError(f"{path}: format {found}, expected {FORMAT}")

@@ -25,8 +25,8 @@ class TrainConfig:
     learning_rate: float = 2e-3
     weight_decay: float = 1e-2
     warm_up: int = 100
-    # Of the running average of the weights; 0 leaves the last ones.
-    average_decay: float = 0.0
+    # A step, of the moving average of the weights that leaves the run; 0 leaves the last ones.
+    ema_decay: float = 0.0
     # nnU-Net's bound of the gradient's norm.
     gradient_norm: float = 12.0
     bfloat16: bool = True
@@ -43,8 +43,8 @@ class TrainConfig:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
         if not 0 <= self.final_share <= 1:
             raise ValueError(f"final_share must lie in 0..1, not {self.final_share}")
-        if not 0 <= self.average_decay < 1:
-            raise ValueError(f"average_decay must lie in 0..1, not {self.average_decay}")
+        if not 0 <= self.ema_decay < 1:
+            raise ValueError(f"ema_decay must lie in 0..1, not {self.ema_decay}")
         if not self.learning_rate > 0:
             raise ValueError(f"learning_rate must be positive, not {self.learning_rate}")
 

@@ -20,7 +20,7 @@ from .losses import composite_loss
 from .metrics import score_mask
 from .network import build_network
 from .predict import THRESHOLD, wire_probability
-from .running_average import RunningAverage
+from .moving_average import MovingAverage
 from .schedule import learning_rate
 from .shards import ShardError, ShardPool
 
@@ -62,7 +62,7 @@ class Trainer:
             self.network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay
         )
         # What is validated and exported; a network of its own, since the other one goes on learning.
-        self.average = RunningAverage(self.network, config.average_decay)
+        self.ema = MovingAverage(self.network, config.ema_decay)
         if checkpoint is not None:
             self._restore(checkpoint)
         self._stop_asked = False
@@ -97,7 +97,7 @@ class Trainer:
                     row = self._learn(batches.pop(self.step).result())
                     steps_curve.append(step=self.step, **row, seconds=time.monotonic() - began)
                     self.step += 1
-                    self.average.update(self.network, self.step)
+                    self.ema.update(self.network, self.step)
                     if self.step % self.config.validate_steps == 0 or self.step == self.config.steps:
                         self._validate(validation_curve)
                     if time.monotonic() - saved > checkpoint_seconds:
@@ -115,7 +115,7 @@ class Trainer:
             config=self.config,
             step=self.step,
             network=self.network.state_dict(),
-            average=self.average.weights,
+            ema=self.ema.weights,
             optimizer=self.optimizer.state_dict(),
             pool_names=list(self.pool.names),
             pool_at=dict(self.pool_at),
@@ -161,7 +161,7 @@ class Trainer:
         if not self.validation:
             return
         network = build_network(self.config.width, self.config.seed)
-        network.load_state_dict(self.average.weights)
+        network.load_state_dict(self.ema.weights)
         network.to(memory_format=torch.channels_last).eval()
         scores = [
             score_mask(wire_probability(network, image, bfloat16=self.config.bfloat16) >= THRESHOLD, mask)
@@ -200,7 +200,7 @@ class Trainer:
                 f"the first ones in {', '.join(map(str, self.pool.folders))}"
             )
         self.network.load_state_dict(checkpoint.network)
-        self.average.weights = checkpoint.average
+        self.ema.weights = checkpoint.ema
         self.optimizer.load_state_dict(checkpoint.optimizer)
         torch.set_rng_state(checkpoint.torch_rng)
         self.step, self.pool_at = checkpoint.step, dict(checkpoint.pool_at)
@@ -213,7 +213,7 @@ class Trainer:
         other = Checkpoint.load(path)
         if other.config.width != self.config.width:
             raise CheckpointError(f"weights of width {other.config.width} do not fit width {self.config.width}")
-        self.network.load_state_dict(other.average)
+        self.network.load_state_dict(other.ema)
         self.inherited_steps = other.inherited_steps + other.step
 
     def _ask_stop(self, *_: object) -> None:

@@ -45,9 +45,9 @@ def losses(run: Path) -> list[dict]:
     return [{k: v for k, v in row.items() if k != "seconds"} for row in read_curve(run / STEP_CURVE)]
 
 
-@pytest.mark.parametrize(("bfloat16", "average_decay"), [(True, 0.0), (False, 0.9)])
-def test_three_steps_and_three_more_are_six_steps(shards, tmp_path, bfloat16, average_decay):
-    config = replace(CONFIG, bfloat16=bfloat16, average_decay=average_decay)
+@pytest.mark.parametrize(("bfloat16", "ema_decay"), [(True, 0.0), (False, 0.9)])
+def test_three_steps_and_three_more_are_six_steps(shards, tmp_path, bfloat16, ema_decay):
+    config = replace(CONFIG, bfloat16=bfloat16, ema_decay=ema_decay)
     Trainer(config, shards=[shards], validation=shards, run=tmp_path / "whole").train()
     assert Trainer(config, shards=[shards], validation=shards, run=tmp_path / "cut").train(until=3) == 3
     assert Trainer(config, shards=[shards], validation=shards, run=tmp_path / "cut").train() == 6
@@ -59,7 +59,7 @@ def test_three_steps_and_three_more_are_six_steps(shards, tmp_path, bfloat16, av
 
 
 def test_the_average_is_that_of_the_weights_after_every_step(shards, tmp_path):
-    config = replace(CONFIG, average_decay=0.3)
+    config = replace(CONFIG, ema_decay=0.3)
     trainer = Trainer(config, shards=[shards], run=tmp_path / "run")
     expected = {name: value.clone() for name, value in trainer.network.state_dict().items()}
     # A rise of 1/10, 2/11, 3/12, 4/13, then the decay itself.
@@ -67,7 +67,7 @@ def test_the_average_is_that_of_the_weights_after_every_step(shards, tmp_path):
         trainer.train(until=step)
         for name, value in trainer.network.state_dict().items():
             expected[name] = decay * expected[name] + (1 - decay) * value
-    average = Checkpoint.load(tmp_path / "run" / CHECKPOINT).average
+    average = Checkpoint.load(tmp_path / "run" / CHECKPOINT).ema
     assert all(torch.allclose(average[name], value, rtol=1e-5, atol=1e-7) for name, value in expected.items())
     last = trainer.network.state_dict()
     assert any(not torch.allclose(average[name], last[name], rtol=1e-5, atol=1e-7) for name in last)
@@ -76,7 +76,18 @@ def test_the_average_is_that_of_the_weights_after_every_step(shards, tmp_path):
 def test_without_decay_the_average_is_the_network(shards, tmp_path):
     Trainer(CONFIG, shards=[shards], run=tmp_path / "run").train(until=2)
     checkpoint = Checkpoint.load(tmp_path / "run" / CHECKPOINT)
-    assert all(torch.equal(checkpoint.average[name], value) for name, value in checkpoint.network.items())
+    assert all(torch.equal(checkpoint.ema[name], value) for name, value in checkpoint.network.items())
+
+
+def test_a_checkpoint_of_before_there_was_an_average_is_read(shards, tmp_path):
+    Trainer(CONFIG, shards=[shards], run=tmp_path / "run").train(until=1)
+    path = tmp_path / "run" / CHECKPOINT
+    state = torch.load(path, weights_only=True)
+    del state["ema"], state["config"]["ema_decay"]
+    torch.save({**state, "format": 1}, path)
+    checkpoint = Checkpoint.load(path)
+    assert all(torch.equal(checkpoint.ema[name], value) for name, value in checkpoint.network.items())
+    assert Trainer(CONFIG, shards=[shards], run=tmp_path / "run").train(until=2) == 2
 
 
 def test_another_seed_is_another_run(shards, tmp_path):
@@ -139,7 +150,7 @@ def test_initial_weights_come_from_another_run(shards, tmp_path):
     first = Checkpoint.load(tmp_path / "first" / CHECKPOINT)
     second = Trainer(CONFIG, shards=[shards], run=tmp_path / "second", init_from=tmp_path / "first" / CHECKPOINT)
     assert second.step == 0 and second.inherited_steps == 2
-    assert all(torch.equal(second.network.state_dict()[name], value) for name, value in first.average.items())
+    assert all(torch.equal(second.network.state_dict()[name], value) for name, value in first.ema.items())
     with pytest.raises(CheckpointError, match="width 2 do not fit width 3"):
         Trainer(
             replace(CONFIG, width=3), shards=[shards], run=tmp_path / "third", init_from=tmp_path / "first" / CHECKPOINT

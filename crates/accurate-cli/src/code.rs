@@ -117,7 +117,9 @@ impl Code {
             Self::NoFit => "no 3D curve explains both views",
             Self::BadInput => "an input says something that cannot be used",
             Self::Calibration => "the calibration is no usable camera or pair of cameras",
-            Self::SizeMismatch => "parts of one view have different sizes",
+            Self::SizeMismatch => {
+                "parts of one view have different sizes, or points lie outside of its picture"
+            }
             Self::TooLarge => "a file, or a size it declares, is larger than accepted",
             Self::Malformed => "a file breaks its format",
             Self::NotFinite => "a number is NaN or infinite",
@@ -195,7 +197,8 @@ impl Code {
             Self::SizeMismatch => {
                 "Masks and images must have the size that the cameras were calibrated for, and both \
                  parts of a view the same size. A resized or cropped image needs its K changed with \
-                 it."
+                 it. Ordered points are pixels of that image: a few may lie just beyond its edge (5 % \
+                 of its longer side), others were seen in an image of another size."
             }
             Self::TooLarge => {
                 "Sizes are checked before memory is taken, so that a small file cannot ask for all \

@@ -18,6 +18,9 @@ use crate::text::read_text;
 /// Options that make no sense in a file.
 const NOT_IN_A_FILE: [&str; 4] = ["config", "help", "version", "json"];
 
+/// Options that make no sense together.
+const EXCLUSIVE: [&str; 2] = ["quiet", "verbose"];
+
 /// The words of the command line with those of its `--config` file put in, behind the command that
 /// they are for and before the user's own.
 ///
@@ -33,6 +36,12 @@ pub fn expand(command: &Command, mut words: Vec<OsString>) -> Result<Vec<OsStrin
     let mut table: Table = text.parse().map_err(|e: toml::de::Error| wrong(e.to_string()))?;
     check(command, &table, "").map_err(wrong)?;
     let own: Vec<String> = words.iter().map(|w| w.to_string_lossy().into_owned()).collect();
+    // Who says one of these does not mean the file's other one.
+    if options(command).any(|arg| EXCLUSIVE.contains(&name(arg).as_str()) && is_given(arg, &own)) {
+        EXCLUSIVE.iter().for_each(|key| {
+            table.remove(*key);
+        });
+    }
     // The global options first, then the command's, then those of a command below it.
     let (mut here, mut insert_at) = (command, 1);
     loop {

@@ -138,6 +138,12 @@ impl From<IoError> for Failure {
                 Code::SizeMismatch,
                 Some("masks and images must have the size the cameras are for"),
             ),
+            IoError::PointOutside { .. } => (
+                Code::SizeMismatch,
+                Some(
+                    "points are pixels (x, y) of the picture that K is for: were they scaled, cropped or swapped?",
+                ),
+            ),
             IoError::TooLarge { .. } => (Code::TooLarge, None),
             IoError::NotText { .. }
             | IoError::Shape { .. }
@@ -167,19 +173,8 @@ impl From<Error> for Failure {
         match error {
             Error::NotSegmented { .. } => Self::new(Self::INTERNAL, message),
             Error::MissingInput { .. } => Self::new(Self::NO_INPUT, message),
-            Error::Segmentation { source, .. } => {
-                let failure = Self::new(code_of(&source), message);
-                match code_of(&source) {
-                    Code::BadMask => failure.with_hint(LOOK_AT_THE_MASK),
-                    _ => failure,
-                }
-            }
-            Error::Traversal {
-                source: TraverseError::Empty { .. } | TraverseError::TooSmall { .. },
-                ..
-            } => Self::new(Code::BadMask, message).with_hint(LOOK_AT_THE_MASK),
-            Error::Traversal { .. } => Self::new(Code::NoOrder, message)
-                .with_hint("order the points yourself and use --input points"),
+            Error::Segmentation { source, .. } => Self::from(source).about(message),
+            Error::Traversal { source, .. } => Self::from(source).about(message),
             Error::Matching { .. } => Self::new(Code::NoMatch, message).with_hint(ASK_THE_DOCTOR),
             Error::NotClosed { .. } => Self::new(Code::NoOrder, message)
                 .with_hint("leave --closed out for a body with two ends"),
@@ -191,9 +186,6 @@ impl From<Error> for Failure {
             Error::MixedUnits { .. } => Self::new(Self::BAD_INPUT, message)
                 .with_hint("measure pairs in one unit at a time: `unit` in meta.json says which"),
             Error::OtherSize { .. } => Self::new(Code::SizeMismatch, message),
-            Error::PointOutside { .. } => Self::new(Code::SizeMismatch, message).with_hint(
-                "points are pixels (x, y) of the picture that image_size and K stand for: were they scaled, cropped or swapped?",
-            ),
             Error::Synthesis(_) => Self::new(Self::USAGE, message),
             _ => Self::new(Self::INTERNAL, message),
         }
@@ -228,12 +220,21 @@ impl From<EvalError> for Failure {
 
 impl From<SegError> for Failure {
     fn from(error: SegError) -> Self {
-        Self::new(code_of(&error), error.to_string())
+        let code = code_of(&error);
+        let failure = Self::new(code, error.to_string());
+        if code == Code::BadMask { failure.with_hint(LOOK_AT_THE_MASK) } else { failure }
     }
 }
 
 impl From<TraverseError> for Failure {
     fn from(error: TraverseError) -> Self {
-        Self::new(Code::NoOrder, error.to_string())
+        let message = error.to_string();
+        match error {
+            TraverseError::Empty { .. } | TraverseError::TooSmall { .. } => {
+                Self::new(Code::BadMask, message).with_hint(LOOK_AT_THE_MASK)
+            }
+            _ => Self::new(Code::NoOrder, message)
+                .with_hint("order the points yourself and use --input points"),
+        }
     }
 }

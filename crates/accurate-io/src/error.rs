@@ -139,6 +139,21 @@ pub enum IoError {
         /// The size there.
         expected: ImageSize,
     },
+    /// A point lies outside of the picture that its camera recorded.
+    #[error(
+        "{}: point {index} at ({:.1}, {:.1}) px lies outside of its picture of {} x {} px",
+        path.display(), point[0], point[1], size.width, size.height
+    )]
+    PointOutside {
+        /// The file.
+        path: PathBuf,
+        /// Its index, from 0.
+        index: usize,
+        /// (x, y) as in the file, px.
+        point: [f64; 2],
+        /// The picture's.
+        size: ImageSize,
+    },
     /// The calibration is no usable camera or rig.
     #[error("{}: {part}: {source}", path.display())]
     Geometry {
@@ -185,6 +200,7 @@ impl IoError {
             | Self::Field { path, .. }
             | Self::Empty { path, .. }
             | Self::SizeMismatch { path, .. }
+            | Self::PointOutside { path, .. }
             | Self::Geometry { path, .. }
             | Self::UnknownExtension { path, .. }
             | Self::NoPair { path } => path,

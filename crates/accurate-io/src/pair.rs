@@ -9,7 +9,7 @@ use crate::distortion::undistort_points;
 use crate::image_file::{BitDepth, GreyImage, read_grey, read_image_size, read_mask};
 use crate::meta::{Meta, check_case_id};
 use crate::ply::read_ply_points;
-use crate::points::read_points;
+use crate::points::read_recorded_points;
 
 /// Ordered centreline points of both views.
 pub type OrderedPoints = (Vec<Pixel<View1>>, Vec<Pixel<View2>>);
@@ -137,8 +137,8 @@ pub fn read_pair(dir: &Path, needs: PairParts) -> Result<Pair, IoError> {
     let lens2 = read_lens(dir, 1, rig.camera2(), needs.masks || needs.images)?;
     let points = if needs.points {
         let [path1, path2] = VIEWS.map(|v| dir.join(points_name(v.0)));
-        let points1 = undistort_points(&path1, &lens1, &read_points(&path1)?)?;
-        let points2 = undistort_points(&path2, &lens2, &read_points(&path2)?)?;
+        let points1 = undistort_points(&path1, &lens1, &read_recorded_points(&path1, size[0])?)?;
+        let points2 = undistort_points(&path2, &lens2, &read_recorded_points(&path2, size[1])?)?;
         Some((points1, points2))
     } else {
         None

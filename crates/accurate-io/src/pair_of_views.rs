@@ -8,7 +8,7 @@ use crate::distortion::undistort_points;
 use crate::image_file::{read_grey, read_mask};
 use crate::meta::check_case_id;
 use crate::pair::Pair;
-use crate::points::read_points;
+use crate::points::read_recorded_points;
 use crate::{IoError, read_curve};
 
 /// What the files of both views hold.
@@ -87,8 +87,8 @@ pub fn pair_of_views(
     };
     match files {
         ViewFiles::Points(_) => {
-            let points1 = read_points::<View1>(&paths[0])?;
-            let points2 = read_points::<View2>(&paths[1])?;
+            let points1 = read_recorded_points::<View1>(&paths[0], size[0])?;
+            let points2 = read_recorded_points::<View2>(&paths[1], size[1])?;
             pair.points = Some((
                 undistort_points(&paths[0], &views[0].camera, &points1)?,
                 undistort_points(&paths[1], &views[1].camera, &points2)?,

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use accurate_geom::{Pixel, View};
+use accurate_geom::{ImageSize, Pixel, View};
 
 use crate::IoError;
 use crate::atomic::write_atomically;
@@ -32,6 +32,32 @@ pub fn read_points<V: View>(path: &Path) -> Result<Vec<Pixel<V>>, IoError> {
         return Err(IoError::Empty { path: path.to_owned(), what: "points" });
     }
     Ok(points)
+}
+
+/// By how much of its picture's longer side a recorded point may lie beyond the edge: bodies that leave the
+/// picture are clicked on to (those of Guide3D up to 0.7 %).
+const BEYOND_THE_EDGE: f64 = 0.05;
+
+/// [`read_points`] as the camera recorded them, in a picture of this size.
+///
+/// # Errors
+/// Those of [`read_points`]; [`IoError::PointOutside`] for the first one that lies outside of the picture
+/// by more than 5 % of its longer side: it may have been seen in a picture of another size.
+pub(crate) fn read_recorded_points<V: View>(
+    path: &Path,
+    size: ImageSize,
+) -> Result<Vec<Pixel<V>>, IoError> {
+    let points = read_points(path)?;
+    let [width, height] = [size.width, size.height].map(f64::from);
+    let beyond = BEYOND_THE_EDGE * width.max(height);
+    let inside = |value: f64, side: f64| (-beyond..=side - 1.0 + beyond).contains(&value);
+    match points.iter().position(|p| !(inside(p.x, width) && inside(p.y, height))) {
+        None => Ok(points),
+        Some(index) => {
+            let point = [points[index].x, points[index].y];
+            Err(IoError::PointOutside { path: path.to_owned(), index, point, size })
+        }
+    }
 }
 
 /// Writes ordered centreline points; reading them gives the same bits.
@@ -124,6 +150,26 @@ mod tests {
     use super::*;
     use accurate_geom::View1;
     use std::fs;
+
+    #[test]
+    fn recorded_points_lie_in_their_picture_but_for_a_twentieth_of_its_longer_side() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("points_L.csv");
+        let size = ImageSize { width: 200, height: 100 };
+        let read = |x: f64, y: f64| {
+            fs::write(&path, format!("x,y\n50,50\n{x},{y}\n")).unwrap();
+            read_recorded_points::<View1>(&path, size)
+        };
+        for (x, y) in [(-10.0, 50.0), (209.0, 50.0), (50.0, -10.0), (50.0, 109.0)] {
+            assert_eq!(read(x, y).unwrap().len(), 2, "{x}, {y}");
+        }
+        for (x, y) in [(-10.1, 50.0), (209.1, 50.0), (50.0, -10.1), (50.0, 109.1)] {
+            let error = read(x, y).unwrap_err();
+            let IoError::PointOutside { index: 1, point, .. } = &error else { panic!("{error}") };
+            assert_eq!(*point, [x, y]);
+            assert!(error.to_string().contains("200 x 100"), "{error}");
+        }
+    }
 
     fn read(text: &[u8]) -> Result<Vec<Pixel<View1>>, IoError> {
         let folder = tempfile::tempdir().unwrap();

@@ -2,7 +2,7 @@ use std::fmt;
 
 use accurate_eval::EvalError;
 use accurate_fit::FitError;
-use accurate_geom::{ImageSize, LengthUnit};
+use accurate_geom::LengthUnit;
 use accurate_io::IoError;
 use accurate_match::MatchError;
 use accurate_seg::SegError;
@@ -70,23 +70,6 @@ pub enum Error {
         found: (usize, usize),
         /// (height, width) of the camera, px.
         expected: (usize, usize),
-    },
-    /// A point was not seen in its camera's image.
-    #[error(
-        "case {case}, view {view}: point {index} at ({:.1}, {:.1}) px lies outside the picture of {} x {} px",
-        point[0], point[1], size.width, size.height
-    )]
-    PointOutside {
-        /// Case id.
-        case: String,
-        /// 1 or 2.
-        view: u8,
-        /// Its index, from 0.
-        index: usize,
-        /// (x, y) as given, px.
-        point: [f64; 2],
-        /// That of the camera's image.
-        size: ImageSize,
     },
     /// The mask of a view could not be skeletonised.
     #[error("case {case}, view {view}: {source}")]
@@ -184,7 +167,6 @@ impl Error {
             Self::NoCandidate { .. } => Some(Stage::Matching),
             Self::MissingInput { .. }
             | Self::OtherSize { .. }
-            | Self::PointOutside { .. }
             | Self::Name(_)
             | Self::Scoring(_)
             | Self::Synthesis(_)

@@ -10,7 +10,7 @@ use ndarray::Array2;
 
 use crate::direction::runs_against;
 use crate::ordered_points::adjusted_points;
-use crate::require::{require_one_size, require_points_inside, require_segmented};
+use crate::require::{require_one_size, require_segmented};
 use crate::robust::{reconstruct_masks, without_strays};
 use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled, sampled_ring};
 use crate::{
@@ -151,9 +151,6 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
         require_segmented(pair)?;
     }
     require_one_size(pair)?;
-    if params.input == InputKind::Points {
-        require_points_inside(pair)?;
-    }
     match (params.method, params.input) {
         (Method::Accurate, InputKind::Mask | InputKind::Image) => {
             return joint_choice(pair, params);

@@ -1,11 +1,6 @@
-use std::ops::Range;
-
-use accurate_geom::{Pixel, Point2, View1};
+use accurate_geom::{Pixel, Point2, View};
 use accurate_seg::{Mask, distance_to_background, median_width_px};
-use accurate_traverse::{
-    CentrelineParams, TraverseError, Walk, WalkEnd, WalkParams, extend_to_body_ends, recentre,
-    smooth_centreline,
-};
+use accurate_traverse::{TraverseError, Walk, WalkEnd, WalkParams, extend_to_body_ends, recentre};
 use ndarray::Array2;
 
 use crate::robust::{Turn, ViewCandidates};
@@ -14,8 +9,7 @@ use crate::{Error, JunctionDecision};
 /// The centreline of the body in one mask, in order, by [`trace_mask`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct MaskTrace {
-    /// Points `(x, y)` between the pixels, px, about [`CentrelineParams::spacing_px`] apart. Of a closed
-    /// body the last repeats the first.
+    /// Points `(x, y)` between the pixels, px, about 1 px apart. Of a closed body the last repeats the first.
     pub points: Vec<Point2>,
     /// Whether it leads back to where it began.
     pub closed: bool,
@@ -23,10 +17,11 @@ pub struct MaskTrace {
     pub coverage: f64,
     /// Straight bridges over what the mask does not show.
     pub bridges: usize,
-    /// By how much the next cheapest walk is dearer; `None` if there is no other. One view cannot tell
-    /// what lies above and what below: a small margin is a crossing that bends either way.
+    /// By how much the next cheapest walk is dearer, in the unit of the prices of
+    /// [`WalkParams`]; `None` if there is no other. The next one may take a crossing the other way, or
+    /// only leave a stub out or turn round at a tip: where nothing crosses it is about 1.
     pub margin: Option<f64>,
-    /// What was decided where strands meet, in order along the walk.
+    /// What was decided at each passage of a place where strands meet, in order along the walk.
     pub junctions: Vec<JunctionDecision>,
 }
 
@@ -34,19 +29,20 @@ pub struct MaskTrace {
 /// one that bends least where strands meet. [`reconstruct`](crate::reconstruct) goes on from several such
 /// walks of both views, which tell more than one view can.
 ///
-/// The walk is drawn to the middle of the mask where one strand is seen, smoothed as far as rounding to
-/// pixels asks for, and led on to the ends of the body.
+/// The walk is drawn to the middle of the mask where one strand is seen, and led on to the ends of the
+/// body.
 ///
 /// # Errors
-/// [`Error::Segmentation`] for a mask that shows no thin body, [`Error::Traversal`]. They name view 1.
+/// [`Error::Segmentation`] for a mask that shows no thin body, [`Error::Traversal`].
 ///
 /// # Cost
 /// Thinning and distances O(pixels), the search of walks, O(length) for the rest: 10 ms for 512 x 512 px.
-pub fn trace_mask(mask: &Array2<bool>, name: &str) -> Result<MaskTrace, Error> {
-    let view = ViewCandidates::<View1>::of(mask, None, &WalkParams::DEFAULT, Turn::NONE, name)?;
+pub fn trace_mask<V: View>(mask: &Array2<bool>, name: &str) -> Result<MaskTrace, Error> {
+    let view = ViewCandidates::<V>::of(mask, None, &WalkParams::DEFAULT, Turn::NONE, name)?;
     let nothing = || Error::NoCandidate { case: name.to_owned(), walks: [0; 2], pairs: 0 };
     let walk = view.walks.first().ok_or_else(nothing)?;
-    let segmentation = |source| Error::Segmentation { case: name.to_owned(), view: 1, source };
+    let segmentation =
+        |source| Error::Segmentation { case: name.to_owned(), view: V::NUMBER, source };
     let body = Mask::from_array(mask.clone()).map_err(segmentation)?;
     let radii = distance_to_background(&body).map_err(segmentation)?;
     let thickness_px = median_width_px(&body).map_err(segmentation)?;
@@ -63,36 +59,29 @@ pub fn trace_mask(mask: &Array2<bool>, name: &str) -> Result<MaskTrace, Error> {
     })
 }
 
-fn centreline(
-    walk: &Walk<View1>,
+fn centreline<V: View>(
+    walk: &Walk<V>,
     radii: &Array2<f64>,
     thickness_px: f64,
-) -> Result<Vec<Pixel<View1>>, TraverseError> {
-    let params = CentrelineParams::DEFAULT;
+) -> Result<Vec<Pixel<V>>, TraverseError> {
     if walk.is_closed() {
-        // Its beginning and its end go on on the other side, so that it closes without a kink.
-        const ROUND: usize = 30;
-        // The last point repeats the first.
+        // The last point repeats the first. Beyond both the walk goes on on the other side, so that it
+        // closes without a kink.
+        const ROUND: usize = 8;
         let once = &walk.points[..walk.points.len() - 1];
         let around = once.len().min(ROUND);
         let wrapped = [&once[once.len() - around..], once, &once[..around]].concat();
-        let smooth = smooth_centreline(&recentre(&wrapped, radii, thickness_px)?, &params)?;
-        let seam = once[0];
-        let nearest = |part: Range<usize>| {
-            part.min_by(|&a, &b| smooth[a].distance(seam).total_cmp(&smooth[b].distance(seam)))
-        };
-        let middle = smooth.len() / 2;
-        let (from, to) = (nearest(0..middle), nearest(middle..smooth.len()));
-        let mut ring = smooth[from.unwrap_or(0)..to.unwrap_or(smooth.len())].to_vec();
+        let centred = recentre(&wrapped, radii, thickness_px)?;
+        let mut ring = centred[around..around + once.len()].to_vec();
         ring.extend(ring.first().copied());
         return Ok(ring);
     }
-    let smooth = smooth_centreline(&recentre(&walk.points, radii, thickness_px)?, &params)?;
-    let whole = extend_to_body_ends(&smooth, radii, thickness_px)?;
+    let centred = recentre(&walk.points, radii, thickness_px)?;
+    let whole = extend_to_body_ends(&centred, radii, thickness_px)?;
     // An end at a junction or on a strand walked along twice is no end of the body: nothing to lead on to.
     let [start, end] = walk.ends.map(|end| end == WalkEnd::Tip);
-    let before = whole.iter().position(|p| *p == smooth[0]).unwrap_or(0);
+    let before = whole.iter().position(|p| *p == centred[0]).unwrap_or(0);
     let from = if start { 0 } else { before };
-    let to = if end { whole.len() } else { before + smooth.len() };
+    let to = if end { whole.len() } else { before + centred.len() };
     Ok(whole[from..to].to_vec())
 }

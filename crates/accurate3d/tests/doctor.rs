@@ -144,7 +144,10 @@ fn curves_whose_points_are_in_no_order_are_refused() {
     };
     let spoiled = Seen::Curves(vec![[one.clone(), shuffled(two)]]);
     let error = diagnose(&cameras, MM, &spoiled).unwrap_err();
-    assert!(matches!(error, DoctorError::Tangled { view: 2, times } if times > 20.0), "{error}");
+    assert!(
+        matches!(error, DoctorError::Tangled { curve: 1, view: 2, times } if times > 20.0),
+        "{error}"
+    );
 }
 
 fn gcd(a: usize, b: usize) -> usize {

@@ -2,7 +2,6 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use accurate3d::fit::CalibrationPriors;
-use accurate3d::geom::Pixel;
 use accurate3d::synth::{CaseOptions, Family, generate};
 use accurate3d::{Error, InputKind, Method, Params, ViewPair, reconstruct};
 use ndarray::Array2;
@@ -82,23 +81,4 @@ fn masks_of_two_bodies_give_one_curve_and_a_doubt() {
     let found = reconstruct(&pair, &params()).unwrap();
     assert!(!found.diagnostics.suspicions.is_empty());
     assert!(found.points.len() > 50);
-}
-
-#[test]
-fn points_of_a_picture_of_another_size_are_refused_by_every_method() {
-    for method in [Method::Accurate, Method::Paper] {
-        let mut pair = pair();
-        let (_, points2) = pair.points.as_mut().unwrap();
-        for point in points2.iter_mut() {
-            let doubled = 2.0 * point.point();
-            *point = Pixel::new(doubled.x, doubled.y);
-        }
-        let params = Params::new(InputKind::Points, method);
-        let error = reconstruct(&pair, &params).unwrap_err();
-        let Error::PointOutside { view, index, point, .. } = &error else { panic!("{error}") };
-        assert_eq!(*view, 2);
-        // The first one that is more than 25 px beyond an edge of the 512.
-        assert!(point[0].max(point[1]) > 511.0 + 0.05 * 512.0, "{index}: {point:?}");
-        assert!(error.to_string().contains("512 x 512"), "{error}");
-    }
 }

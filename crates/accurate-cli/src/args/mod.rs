@@ -39,12 +39,11 @@ pub struct Cli {
     pub command: Command,
 
     /// Say less: errors only.
-    // The later one wins: the command line over the config file, whose words come first.
-    #[arg(short, long, global = true, overrides_with = "verbose")]
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
 
     /// Say more; repeat for more still.
-    #[arg(short, long, global = true, action = ArgAction::Count, overrides_with = "quiet")]
+    #[arg(short, long, global = true, action = ArgAction::Count)]
     pub verbose: u8,
 
     /// Print machine-readable JSON instead of prose on stdout.
@@ -93,7 +92,7 @@ pub enum Command {
     Eval(EvalArgs),
     /// Make the paper's comparison table, its published figures beside ours.
     Table(TableArgs),
-    /// Order the pixels of one mask along its curve.
+    /// Put the centreline of one mask in order.
     Trace(TraceArgs),
     /// Find the thin body in images: mask, probability, skeleton over the image.
     Segment(SegmentArgs),

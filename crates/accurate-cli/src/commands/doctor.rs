@@ -4,7 +4,7 @@ use accurate3d::NOT_FOR_CLINICAL_USE;
 use accurate3d::doctor::{
     CANNOT_BE_TOLD, Diagnosis, DoctorError, Finding, LEAST_PLACES, Mistake, Seen, Verdict, diagnose,
 };
-use accurate3d::geom::{Camera, LengthUnit, Point2, Rig, View1};
+use accurate3d::geom::{Camera, LengthUnit, Point2, Rig, View, View1, View2};
 use accurate3d::io::{
     NamedView, PairParts, Truth, find_pairs, read_mask, read_pair, read_points, write_rig,
 };
@@ -121,7 +121,8 @@ fn of_files(args: &DoctorArgs, views: &[NamedView; 2]) -> Result<Option<Seen>, F
         curves.push([points_of(&files[0])?, points_of(&files[1])?]);
     }
     for files in args.masks.chunks_exact(2) {
-        curves.push([traced(&files[0], &views[0])?, traced(&files[1], &views[1])?]);
+        let [one, two] = [&files[0], &files[1]];
+        curves.push([traced::<View1>(one, &views[0])?, traced::<View2>(two, &views[1])?]);
     }
     Ok((!curves.is_empty()).then_some(Seen::Curves(curves)))
 }
@@ -154,7 +155,11 @@ fn of_pair_folders(folders: &[PathBuf]) -> Result<([NamedView; 2], Option<Seen>)
                 let plain1 = one.iter().map(|p| p.point()).collect();
                 curves.push([plain1, two.iter().map(|p| p.point()).collect()]);
             } else if let Some(masks) = pair.masks {
-                curves.push([traced_mask(&masks[0])?, traced_mask(&masks[1])?]);
+                let one =
+                    traced_mask::<View1>(&masks[0]).map_err(|failure| failure.of_file(&dir))?;
+                let two =
+                    traced_mask::<View2>(&masks[1]).map_err(|failure| failure.of_file(&dir))?;
+                curves.push([one, two]);
             }
         }
     }
@@ -177,14 +182,21 @@ fn points_of(path: &Path) -> Result<Vec<Point2>, Failure> {
     Ok(read_points::<View1>(path)?.iter().map(|p| p.point()).collect())
 }
 
-fn traced(path: &Path, view: &NamedView) -> Result<Vec<Point2>, Failure> {
+fn traced<V: View>(path: &Path, view: &NamedView) -> Result<Vec<Point2>, Failure> {
     let mask = read_mask(path)?;
     view.check_size(path, mask.dim())?;
-    traced_mask(&mask).map_err(|failure| failure.of_file(path))
+    traced_mask::<V>(&mask).map_err(|failure| failure.of_file(path))
 }
 
-fn traced_mask(mask: &Array2<bool>) -> Result<Vec<Point2>, Failure> {
-    Ok(ordered(mask, TraceMethod::Accurate)?.points)
+fn traced_mask<V: View>(mask: &Array2<bool>) -> Result<Vec<Point2>, Failure> {
+    let traced = ordered::<V>(mask, TraceMethod::Accurate)?;
+    if traced.closed {
+        let message = format!("view {}: the body is closed", V::NUMBER);
+        return Err(Failure::new(Failure::BAD_INPUT, message).with_hint(
+            "where a ring begins in either view is not known: give points that belong together, with --matched",
+        ));
+    }
+    Ok(traced.points)
 }
 
 fn common_unit(views: &[NamedView; 2]) -> Result<LengthUnit, Failure> {

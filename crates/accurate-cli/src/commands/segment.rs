@@ -16,7 +16,7 @@ use crate::console::Console;
 use crate::dicom_child::read_picture;
 use crate::failure::Failure;
 use crate::segmentation::segmenter_with;
-use crate::text::{make_folder, write_text};
+use crate::text::{has_extension, make_folder, write_text};
 
 /// Part of `--threshold` down to which connected pixels are taken: the default's 0.3 of 0.5.
 const WEAK: f32 = 0.6;
@@ -62,8 +62,7 @@ fn jobs(args: &SegmentArgs) -> Result<Vec<(PathBuf, String)>, Failure> {
     let mut names: BTreeMap<String, &Path> = BTreeMap::new();
     let mut jobs = Vec::new();
     for image in &args.images {
-        let stem = image.file_stem().map(|s| s.to_string_lossy().into_owned());
-        let name = stem.ok_or_else(|| {
+        let name = name_of(image).ok_or_else(|| {
             Failure::new(Failure::USAGE, format!("{} names no file", image.display()))
         })?;
         if let Some(other) = names.insert(name.clone(), image) {
@@ -77,6 +76,15 @@ fn jobs(args: &SegmentArgs) -> Result<Vec<(PathBuf, String)>, Failure> {
         jobs.push((image.clone(), name));
     }
     Ok(jobs)
+}
+
+/// A file's name without the extension of a kind of image: DICOM files are often named by numbers with dots.
+fn name_of(image: &Path) -> Option<String> {
+    const KINDS: [&str; 12] =
+        ["png", "jpg", "jpeg", "tif", "tiff", "bmp", "pnm", "pgm", "ppm", "pbm", "dcm", "dicom"];
+    let is_kind = KINDS.iter().any(|kind| has_extension(image, kind));
+    let name = if is_kind { image.file_stem() } else { image.file_name() };
+    name.map(|name| name.to_string_lossy().into_owned())
 }
 
 /// Which frame of DICOM runs.
@@ -100,6 +108,11 @@ fn one(
     segmenter: &NetworkSegmenter,
 ) -> Result<Value, Failure> {
     let image = read_picture(path, frame)?;
+    let frame = match (is_dicom(path)?, frame) {
+        (false, _) => Value::Null,
+        (true, FrameChoice::Mean) => "mean".into(),
+        (true, FrameChoice::One(index)) => index.into(),
+    };
     let found = segmenter.segment(&polarity.with_body_dark(image.clone()), &unwatched)?;
     let skeleton = zhang_suen(&found.mask);
     let width = if found.mask.is_empty() { None } else { Some(median_width_px(&found.mask)?) };
@@ -118,6 +131,7 @@ fn one(
     let (height, columns) = image.dim();
     Ok(json!({
         "image": path.display().to_string(),
+        "frame": frame,
         "size": [columns, height],
         "body_px": found.mask.count(),
         "skeleton_px": skeleton.count(),

@@ -1,6 +1,6 @@
 use std::fmt::Write;
 
-use accurate3d::geom::{Point2, View1};
+use accurate3d::geom::{Point2, View, View1};
 use accurate3d::io::read_mask;
 use accurate3d::seg::{Mask, Skeleton, zhang_suen};
 use accurate3d::traverse::{TraverseParams, trace_single};
@@ -19,7 +19,7 @@ pub fn run(args: &TraceArgs, console: &Console) -> Result<(), Failure> {
         make_place(path)?;
         refuse_what_is_read(path, &places([&args.mask]))?;
     }
-    let traced = ordered(&read_mask(&args.mask)?, args.method)
+    let traced = ordered::<View1>(&read_mask(&args.mask)?, args.method)
         .map_err(|failure| failure.of_file(&args.mask))?;
     let mut csv = String::from("x,y\n");
     for p in &traced.points {
@@ -41,29 +41,31 @@ pub fn run(args: &TraceArgs, console: &Console) -> Result<(), Failure> {
 /// A centreline in order, and what is said about it.
 pub struct Ordered {
     pub points: Vec<Point2>,
+    /// Whether it is known to lead back to its beginning.
+    pub closed: bool,
     summary: String,
     details: Vec<String>,
     report: Value,
 }
 
-/// The skeleton of a mask in order.
-pub fn ordered(mask: &Array2<bool>, method: TraceMethod) -> Result<Ordered, Failure> {
+/// The centreline of a mask of view `V` in order.
+pub fn ordered<V: View>(mask: &Array2<bool>, method: TraceMethod) -> Result<Ordered, Failure> {
     match method {
-        TraceMethod::Accurate => cheapest_walk(mask),
-        TraceMethod::Paper => greedy(mask),
+        TraceMethod::Accurate => cheapest_walk::<V>(mask),
+        TraceMethod::Paper => greedy::<V>(mask),
     }
 }
 
-fn cheapest_walk(mask: &Array2<bool>) -> Result<Ordered, Failure> {
-    let trace = trace_mask(mask, "mask").map_err(|error| match error {
-        // There is one view: its number and the case say nothing.
+fn cheapest_walk<V: View>(mask: &Array2<bool>) -> Result<Ordered, Failure> {
+    let trace = trace_mask::<V>(mask, "mask").map_err(|error| match error {
+        // There is no case.
         Error::Segmentation { source, .. } => source.into(),
         Error::Traversal { source, .. } => source.into(),
         other => Failure::from(other),
     })?;
     let MaskTrace { points, closed, coverage, bridges, margin, junctions } = trace;
     let mut summary = format!(
-        "{} points{}, coverage {:.1} %, {} junctions, {bridges} bridges",
+        "{} points{}, coverage {:.1} %, {} decisions, {bridges} bridges",
         points.len(),
         if closed { " of a closed curve" } else { "" },
         100.0 * coverage,
@@ -95,12 +97,12 @@ fn cheapest_walk(mask: &Array2<bool>) -> Result<Ordered, Failure> {
         "margin": margin,
         "junctions": junctions,
     });
-    Ok(Ordered { points, summary, details, report })
+    Ok(Ordered { points, closed, summary, details, report })
 }
 
-fn greedy(mask: &Array2<bool>) -> Result<Ordered, Failure> {
+fn greedy<V: View>(mask: &Array2<bool>) -> Result<Ordered, Failure> {
     let skeleton = Skeleton::of(&zhang_suen(&Mask::from_array(mask.clone())?))?;
-    let trace = trace_single(&skeleton.pixels_as::<View1>(), &TraverseParams::PAPER)?;
+    let trace = trace_single(&skeleton.pixels_as::<V>(), &TraverseParams::PAPER)?;
     let points: Vec<Point2> = trace.points.iter().map(|p| p.point()).collect();
     let (count, jumps) = (points.len(), trace.jumps.len());
     let summary = format!(
@@ -113,7 +115,8 @@ fn greedy(mask: &Array2<bool>) -> Result<Ordered, Failure> {
         "coverage": trace.coverage,
         "jumps": jumps,
     });
-    Ok(Ordered { points, summary, details: Vec::new(), report })
+    // A ring has no end to begin at, and is refused.
+    Ok(Ordered { points, closed: false, summary, details: Vec::new(), report })
 }
 
 fn coordinates(points: &[Point2]) -> Vec<[f64; 2]> {

@@ -286,7 +286,7 @@ fn points_of_a_scaled_picture_are_refused_with_what_may_have_happened() {
     let (code, said) =
         failure(run.args(["reconstruct", "-i", "points", "-o"]).arg(&out).arg(&pair));
     assert_eq!(code, 65, "{said}");
-    assert!(said.contains("error[A022]") && said.contains("view 2: point"), "{said}");
+    assert!(said.contains("error[A022]") && said.contains("points_R.csv: point"), "{said}");
     assert!(said.contains("scaled") && !out.exists(), "{said}");
 }
 
@@ -302,16 +302,50 @@ fn what_a_pair_folder_says_itself_is_not_said_again_to_the_doctor() {
 }
 
 #[test]
-fn the_later_of_quiet_and_verbose_wins() {
+fn quiet_or_verbose_on_the_command_line_wins_over_either_in_the_config_file() {
     let dir = TempDir::new().unwrap();
     let config = dir.path().join("accurate.toml");
-    fs::write(&config, "quiet = true\n").unwrap();
     let mask = samples().join("bend/masks/mask_L.png");
-    let remarks = |words: &[&str]| {
+    let remarks = |setting: &str, before: &[&str], after: &[&str]| {
+        fs::write(&config, setting).unwrap();
         let mut trace = accurate();
-        trace.arg("--config").arg(&config).args(words).arg("trace").arg(&mask);
+        trace.arg("--config").arg(&config).args(before).arg("trace").arg(&mask).args(after);
         String::from_utf8(trace.assert().success().get_output().stderr.clone()).unwrap()
     };
-    assert_eq!(remarks(&[]), "");
-    assert!(remarks(&["-v"]).contains("coverage"));
+    assert_eq!(remarks("quiet = true\n", &[], &[]), "");
+    assert!(remarks("quiet = true\n", &["-v"], &[]).contains("coverage"));
+    assert!(remarks("quiet = true\n", &[], &["-v"]).contains("coverage"));
+    assert_eq!(remarks("verbose = 2\n", &[], &["--quiet"]), "");
+}
+
+#[test]
+fn the_doctor_refuses_masks_of_rings() {
+    let dir = TempDir::new().unwrap();
+    let pair = samples().join("bend");
+    let size = accurate3d::io::read_mask(&pair.join("masks/mask_L.png")).unwrap().dim();
+    let ring = ndarray::Array2::from_shape_fn(size, |(y, x)| {
+        let radius = (x as f64 - 60.0).hypot(y as f64 - 60.0);
+        (radius - 40.0).abs() <= 1.5
+    });
+    let mask = dir.path().join("ring.png");
+    accurate3d::io::write_mask(&mask, &ring).unwrap();
+    let mut doctor = accurate();
+    doctor.args(["camera", "doctor"]).arg(&pair).arg("--masks").args([&mask, &mask]);
+    let (code, said) = failure(&mut doctor);
+    assert_eq!(code, 65, "{said}");
+    assert!(said.contains("ring.png") && said.contains("closed"), "{said}");
+}
+
+#[test]
+fn one_pixel_is_no_body_to_trace() {
+    let dir = TempDir::new().unwrap();
+    let mut mask = ndarray::Array2::from_elem((20, 20), false);
+    mask[[10, 10]] = true;
+    let path = dir.path().join("dot.png");
+    accurate3d::io::write_mask(&path, &mask).unwrap();
+    for method in ["accurate", "paper"] {
+        let (code, said) = failure(accurate().args(["trace", "--method", method]).arg(&path));
+        assert_eq!(code, 65, "{said}");
+        assert!(said.contains("error[A027]") && said.contains("dot.png"), "{said}");
+    }
 }

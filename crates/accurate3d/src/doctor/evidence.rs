@@ -26,10 +26,10 @@ const MOST_INDEPENDENT: f64 = 200.0;
 const CURVE_SAMPLES: f64 = 250.0;
 /// Neighbouring samples of a curve that err together.
 const SAMPLES_TOGETHER: f64 = 10.0;
-/// Longest curve for the diagonal of its box. Of the generated families helices are the longest (9.3
-/// at most of 120 curves of 1 to 12 turns); shuffled points reach some hundred. In samples of so long a curve the picture
-/// is a few samples wide, and anything goes with anything.
-const MOST_TANGLED: f64 = 20.0;
+/// Longest curve for the diagonal of its box. Of the generated families helices are the longest (9.3 at
+/// most of 120 curves); `n` shuffled points reach about `0.35 n`, so of fewer than 60 nothing is known. In
+/// samples of so long a curve the picture is a few samples wide, and anything goes with anything.
+pub const MOST_TANGLED: f64 = 20.0;
 /// Scale of the errors that the matcher's prices are made for, in samples.
 const CURVE_ERROR: f64 = 0.3;
 /// Share of the smallest residuals that is taken for good matches.
@@ -82,7 +82,7 @@ impl Evidence {
                 }
                 let mut longest: f64 = 0.0;
                 let mut lines = Vec::with_capacity(curves.len());
-                for pair in curves {
+                for (index, pair) in curves.iter().enumerate() {
                     let mut line =
                         |view: u8, points: &Vec<Point2>| -> Result<Polyline2, DoctorError> {
                             if let Some(index) = points.iter().position(|p| !is_finite(p)) {
@@ -94,7 +94,8 @@ impl Evidence {
                             }
                             let times = line.length() / box_diagonal(points);
                             if times > MOST_TANGLED {
-                                return Err(DoctorError::Tangled { view, times });
+                                let curve = index + 1;
+                                return Err(DoctorError::Tangled { curve, view, times });
                             }
                             longest = longest.max(line.length());
                             Ok(line)

@@ -13,8 +13,8 @@ mod turns;
 use accurate_geom::{Camera, GeomError, LengthUnit, Point2};
 use thiserror::Error;
 
-pub use evidence::Seen;
 use evidence::{Evidence, Explains};
+pub use evidence::{MOST_TANGLED, Seen};
 use hypotheses::{Hypothesis, displaced, plain, singles};
 pub use mistake::{LensCentre, Mistake, Which};
 pub use scale::Remark;
@@ -40,12 +40,15 @@ pub enum DoctorError {
     },
     /// Points that are in no order along a body.
     #[error(
-        "a curve of view {view} is {times:.0} times as long as the box it lies in: its points are in no order"
+        "curve {curve} of view {view} is {times:.0} times as long as the diagonal of its box: its points \
+         seem to be in no order"
     )]
     Tangled {
+        /// Which pair of curves, from 1.
+        curve: usize,
         /// 1 or 2.
         view: u8,
-        /// Its length over the diagonal of its bounding box.
+        /// Its length over the diagonal of its bounding box, more than [`MOST_TANGLED`].
         times: f64,
     },
     /// The cameras as given cannot be used together, and no mistake explains it.

@@ -1,10 +1,10 @@
-"""The running average of a network's weights along its training, which is better than where it ends."""
+"""The exponential moving average (EMA) of a network's weights along its training."""
 
 import torch
 from torch import nn
 
 
-class RunningAverage:
+class MovingAverage:
     """`average <- d average + (1 - d) weights` after every step, d rising to `decay` from a start without memory.
 
     With a decay of 0 it is the network itself. (Polyak and Juditsky 1992; the rise is that of TensorFlow's
