@@ -71,7 +71,8 @@ fn cheapest_walk<V: View>(mask: &Array2<bool>) -> Result<Ordered, Failure> {
         100.0 * coverage,
         junctions.len()
     );
-    if let Some(margin) = margin {
+    // Where nothing was decided the next walk only turns round at a tip.
+    if let Some(margin) = margin.filter(|_| !junctions.is_empty()) {
         let _ = write!(summary, "; the next walk is dearer by {margin:.2}");
     }
     let details = junctions
