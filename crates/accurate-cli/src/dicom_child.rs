@@ -3,9 +3,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use accurate3d::io::{
-    FrameChoice, NamedView, is_dicom, read_dicom_pixels, read_dicom_view, read_grey,
-};
+use accurate3d::io::{FrameChoice, NamedView, read_dicom_pixels, read_dicom_view, read_grey};
 use ndarray::Array2;
 use serde_json::{Value, json};
 
@@ -56,8 +54,8 @@ pub fn read_view(path: &Path) -> Result<NamedView, Failure> {
 }
 
 /// A frame of a DICOM run, or the picture of an image file.
-pub fn read_picture(path: &Path, choice: FrameChoice) -> Result<Array2<f32>, Failure> {
-    if is_dicom(path)? { read_frame(path, choice) } else { Ok(read_grey(path)?.values) }
+pub fn read_picture(path: &Path, dicom: bool, choice: FrameChoice) -> Result<Array2<f32>, Failure> {
+    if dicom { read_frame(path, choice) } else { Ok(read_grey(path)?.values) }
 }
 
 /// A frame of a DICOM file through its window, 0 to 255, read by such a child.

@@ -146,8 +146,10 @@ pub fn pair_of_files(args: &ReconstructArgs) -> Result<(Pair, Vec<PathBuf>), Fai
         InputKind::Mask => ViewFiles::Masks(paths),
         InputKind::Image if dicom.contains(&true) => {
             let [first, second] = frame_choices(&args.frame);
-            let frames =
-                [dicom_child::read_picture(one, first)?, dicom_child::read_picture(two, second)?];
+            let frames = [
+                dicom_child::read_picture(one, dicom[0], first)?,
+                dicom_child::read_picture(two, dicom[1], second)?,
+            ];
             ViewFiles::Frames(paths, frames)
         }
         InputKind::Image => ViewFiles::Images(paths),

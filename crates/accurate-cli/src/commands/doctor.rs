@@ -11,8 +11,8 @@ use accurate3d::io::{
 use ndarray::Array2;
 use serde_json::{Value, json};
 
-use super::trace::ordered;
-use crate::args::{DoctorArgs, TraceMethod};
+use super::trace::cheapest_walk;
+use crate::args::DoctorArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::text::{has_extension, make_place};
@@ -189,7 +189,7 @@ fn traced<V: View>(path: &Path, view: &NamedView) -> Result<Vec<Point2>, Failure
 }
 
 fn traced_mask<V: View>(mask: &Array2<bool>) -> Result<Vec<Point2>, Failure> {
-    let traced = ordered::<V>(mask, TraceMethod::Accurate)?;
+    let traced = cheapest_walk::<V>(mask)?;
     if traced.closed {
         let message = format!("view {}: the body is closed", V::NUMBER);
         return Err(Failure::new(Failure::BAD_INPUT, message).with_hint(

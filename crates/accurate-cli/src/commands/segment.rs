@@ -107,8 +107,9 @@ fn one(
     polarity: Polarity,
     segmenter: &NetworkSegmenter,
 ) -> Result<Value, Failure> {
-    let image = read_picture(path, frame)?;
-    let frame = match (is_dicom(path)?, frame) {
+    let dicom = is_dicom(path)?;
+    let image = read_picture(path, dicom, frame)?;
+    let frame = match (dicom, frame) {
         (false, _) => Value::Null,
         (true, FrameChoice::Mean) => "mean".into(),
         (true, FrameChoice::One(index)) => index.into(),

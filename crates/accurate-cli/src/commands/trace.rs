@@ -19,7 +19,7 @@ pub fn run(args: &TraceArgs, console: &Console) -> Result<(), Failure> {
         make_place(path)?;
         refuse_what_is_read(path, &places([&args.mask]))?;
     }
-    let traced = ordered::<View1>(&read_mask(&args.mask)?, args.method)
+    let traced = ordered(&read_mask(&args.mask)?, args.method)
         .map_err(|failure| failure.of_file(&args.mask))?;
     let mut csv = String::from("x,y\n");
     for p in &traced.points {
@@ -39,30 +39,30 @@ pub fn run(args: &TraceArgs, console: &Console) -> Result<(), Failure> {
 }
 
 /// A centreline in order, and what is said about it.
-pub struct Ordered {
-    pub points: Vec<Point2>,
-    /// Whether it is known to lead back to its beginning.
-    pub closed: bool,
+struct Ordered {
+    points: Vec<Point2>,
     summary: String,
     details: Vec<String>,
     report: Value,
 }
 
-/// The centreline of a mask of view `V` in order.
-pub fn ordered<V: View>(mask: &Array2<bool>, method: TraceMethod) -> Result<Ordered, Failure> {
+fn ordered(mask: &Array2<bool>, method: TraceMethod) -> Result<Ordered, Failure> {
     match method {
-        TraceMethod::Accurate => cheapest_walk::<V>(mask),
-        TraceMethod::Paper => greedy::<V>(mask),
+        TraceMethod::Accurate => Ok(described(cheapest_walk::<View1>(mask)?)),
+        TraceMethod::Paper => greedy(mask),
     }
 }
 
-fn cheapest_walk<V: View>(mask: &Array2<bool>) -> Result<Ordered, Failure> {
-    let trace = trace_mask::<V>(mask, "mask").map_err(|error| match error {
-        // There is no case.
+/// The mask of view `V` by [`trace_mask`], with errors that name no case.
+pub fn cheapest_walk<V: View>(mask: &Array2<bool>) -> Result<MaskTrace, Failure> {
+    trace_mask::<V>(mask, "mask").map_err(|error| match error {
         Error::Segmentation { source, .. } => source.into(),
         Error::Traversal { source, .. } => source.into(),
-        other => Failure::from(other),
-    })?;
+        other => other.into(),
+    })
+}
+
+fn described(trace: MaskTrace) -> Ordered {
     let MaskTrace { points, closed, coverage, bridges, margin, junctions } = trace;
     let mut summary = format!(
         "{} points{}, coverage {:.1} %, {} decisions, {bridges} bridges",
@@ -98,12 +98,12 @@ fn cheapest_walk<V: View>(mask: &Array2<bool>) -> Result<Ordered, Failure> {
         "margin": margin,
         "junctions": junctions,
     });
-    Ok(Ordered { points, closed, summary, details, report })
+    Ordered { points, summary, details, report }
 }
 
-fn greedy<V: View>(mask: &Array2<bool>) -> Result<Ordered, Failure> {
+fn greedy(mask: &Array2<bool>) -> Result<Ordered, Failure> {
     let skeleton = Skeleton::of(&zhang_suen(&Mask::from_array(mask.clone())?))?;
-    let trace = trace_single(&skeleton.pixels_as::<V>(), &TraverseParams::PAPER)?;
+    let trace = trace_single(&skeleton.pixels_as::<View1>(), &TraverseParams::PAPER)?;
     let points: Vec<Point2> = trace.points.iter().map(|p| p.point()).collect();
     let (count, jumps) = (points.len(), trace.jumps.len());
     let summary = format!(
@@ -116,8 +116,7 @@ fn greedy<V: View>(mask: &Array2<bool>) -> Result<Ordered, Failure> {
         "coverage": trace.coverage,
         "jumps": jumps,
     });
-    // A ring has no end to begin at, and is refused.
-    Ok(Ordered { points, closed: false, summary, details: Vec::new(), report })
+    Ok(Ordered { points, summary, details: Vec::new(), report })
 }
 
 fn coordinates(points: &[Point2]) -> Vec<[f64; 2]> {
