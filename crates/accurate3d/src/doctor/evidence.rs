@@ -92,7 +92,7 @@ impl Evidence {
                             if !(line.length() > 0.0) {
                                 return Err(DoctorError::TooFewPoints { found: 1, needed: 2 });
                             }
-                            let times = line.length() / box_diagonal(points);
+                            let times = line.length() / line.bounding_box_diagonal();
                             if times > MOST_TANGLED {
                                 let curve = index + 1;
                                 return Err(DoctorError::Tangled { curve, view, times });
@@ -139,17 +139,6 @@ impl Evidence {
             }
         }
     }
-}
-
-/// Of the axis-parallel box about the points, px.
-fn box_diagonal(points: &[Point2]) -> f64 {
-    let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-    for p in points {
-        for (end, value) in ends.iter_mut().zip([p.x, p.y]) {
-            *end = [end[0].min(value), end[1].max(value)];
-        }
-    }
-    (ends[0][1] - ends[0][0]).hypot(ends[1][1] - ends[1][0])
 }
 
 fn is_finite(p: &Point2) -> bool {
