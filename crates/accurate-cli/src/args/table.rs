@@ -59,13 +59,16 @@ pub struct TableArgs {
     /// Write the table here instead of to stdout.
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Write the scores and doubts of every case here, and say how many of the wrong curves are suspect.
+    #[arg(long, value_name = "FILE.csv")]
+    pub per_case: Option<PathBuf>,
     /// Estimate a small shift and turn of camera 2 together with the curve (accurate mode only).
     #[arg(long)]
     pub refine_calibration: bool,
     /// Instead of a table: measure every cell of this file and compare it with its accepted
     /// interval.
     #[arg(long, value_name = "CELLS.csv", conflicts_with_all = [
-        "set", "method", "input", "seeds", "cases", "points", "scores", "format", "out",
+        "set", "method", "input", "seeds", "cases", "points", "scores", "format", "out", "per_case",
         "refine_calibration", "mask_thickness_px", "occlusions", "occlusion_radius_px",
         "calibration_rotation_deg", "calibration_shift_px",
     ])]

@@ -5,8 +5,9 @@ use accurate3d::io::{PairParts, Truth, find_pairs, read_pair};
 use accurate3d::seg::Segmenter;
 use accurate3d::synth::Family;
 use accurate3d::table::{
-    CaseSet, CellCheck, Measuring, Outcome, PointsProtocol, Row, check_case_count, check_cells,
-    grid, measure, need_images, paper_rows, parse_cells, render, write_cells,
+    CaseSet, CellCheck, Flags, Measuring, Outcome, PointsProtocol, Row, cases_csv,
+    check_case_count, check_cells, grid, measure, need_images, paper_rows, parse_cells, render,
+    write_cells,
 };
 use accurate3d::{InputKind, NOT_FOR_CLINICAL_USE, ViewPair};
 use comfy_table::Table as TerminalTable;
@@ -36,7 +37,11 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
             "no row of the table has these methods and inputs",
         ));
     }
-    if let Some(path) = &args.out {
+    if args.out.is_some() && args.out == args.per_case {
+        return Err(Failure::new(Failure::USAGE, "the table and its cases cannot be one file")
+            .with_hint("name another file with --per-case"));
+    }
+    for path in args.out.iter().chain(&args.per_case) {
         make_place(path)?;
     }
     let calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
@@ -48,6 +53,7 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
     };
     let how = Measuring {
         scores: args.scores,
+        both_scores: args.per_case.is_some(),
         calibration,
         segmenter: segmenter.as_ref().map(|s| s as &dyn Segmenter),
     };
@@ -69,9 +75,24 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
         Some(path) => write_text(path, &text)?,
         None => console.data(text.trim_end())?,
     }
+    if let Some(path) = &args.per_case {
+        let lines = cases_csv(&table).map_err(|problem| {
+            Failure::new(Failure::BAD_INPUT, format!("{}: {problem}", path.display()))
+        })?;
+        write_text(path, &lines)?;
+    }
     for row in &table.rows {
-        for (case, reason) in row.result.iter().flat_map(|m| &m.failures) {
-            console.detail(&format!("{} ({}), {case}: {reason}", row.row.label, row.row.input));
+        let name = format!("{} ({})", row.row.label, row.row.input);
+        let Ok(measured) = &row.result else { continue };
+        for (case, reason) in measured.failures() {
+            console.detail(&format!("{name}, {case}: {reason}"));
+        }
+        if args.per_case.is_some() {
+            let Flags { wrong, right } = Flags::of(&measured.cases);
+            console.remark(&format!(
+                "{name}: {} of {} wrong curves are suspect (Hausdorff 5 px or more), {} of {} right ones",
+                wrong[0], wrong[1], right[0], right[1]
+            ));
         }
     }
     console.remark(&format!("{} cases of {}. {NOT_FOR_CLINICAL_USE}", table.cases, table.set));

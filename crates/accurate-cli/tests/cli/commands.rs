@@ -299,6 +299,45 @@ fn a_folder_of_pairs_can_be_tabled_if_they_are_in_one_unit() {
 }
 
 #[test]
+fn the_cases_of_a_table_make_up_its_means() {
+    let dir = TempDir::new().unwrap();
+    let file = dir.path().join("new/cases.csv");
+    let mut table = accurate();
+    table.args(["table", "--set", "medium", "--seeds", "1000", "--cases", "3", "--input"]);
+    table.args(["mask", "--format", "json", "--per-case"]).arg(&file);
+    let said = table.assert().success().get_output().clone();
+    let found: Value = serde_json::from_slice(&said.stdout).unwrap();
+    let mut reader = csv::Reader::from_path(&file).unwrap();
+    let headings = reader.headers().unwrap().clone();
+    let lines: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    let at = |line: &csv::StringRecord, name: &str| {
+        line[headings.iter().position(|heading| heading == name).unwrap()].to_owned()
+    };
+    for (label, flagged) in [("accurate (ours)", "of 0 wrong curves"), ("ACCURATE (paper)", "of ")]
+    {
+        let of_row: Vec<_> = lines.iter().filter(|line| at(line, "label") == label).collect();
+        assert_eq!(of_row.len(), 3, "{label}");
+        let row = found["rows"].as_array().unwrap().iter().find(|row| row["label"] == label);
+        for (name, metric) in [("overall", "Overall"), ("max_error", "Max Err.")] {
+            let mean =
+                of_row.iter().map(|l| at(l, name).parse::<f64>().unwrap()).sum::<f64>() / 3.0;
+            let metrics = row.unwrap()["metrics"].as_array().unwrap();
+            let there = metrics.iter().find(|m| m["metric"] == metric).unwrap()["value"].as_f64();
+            assert!((mean - there.unwrap()).abs() < 1e-12 * mean, "{label} {name}: {mean}");
+        }
+        for line in of_row {
+            let hausdorff_px: f64 = at(line, "hausdorff_px").parse().unwrap();
+            assert_eq!(at(line, "right"), (hausdorff_px < 5.0).to_string());
+            assert!(at(line, "case").starts_with("medium-1000-"));
+        }
+        let remarks = String::from_utf8_lossy(&said.stderr);
+        assert!(remarks.contains(label) && remarks.contains(flagged), "{remarks}");
+    }
+    let (code, message) = failure(table.arg("-o").arg(&file));
+    assert!(code == 2 && message.contains("cannot be one file"), "{code} {message}");
+}
+
+#[test]
 fn version_and_help_say_what_this_is_not() {
     for flag in ["--version", "--help"] {
         assert!(stdout(accurate().arg(flag)).contains("not for clinical use"), "{flag}");

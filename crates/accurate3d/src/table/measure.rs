@@ -9,6 +9,7 @@ use accurate_synth::{CaseOptions, Family, XrayOptions, generate, render_xray};
 use rayon::prelude::*;
 
 use super::ScoreKind;
+use super::outcome::{CaseOutcome, CaseScores, RIGHT_PX};
 use super::rows::{Outcome, Row};
 use crate::{Error, InputKind, Params, ViewPair, reconstruct, reconstruct_images, segment_images};
 
@@ -119,17 +120,6 @@ fn bytes_of(pair: &ViewPair) -> Vec<u8> {
     bytes
 }
 
-/// The scores of one case, of the kind the table shows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Scored {
-    Table(TableScores),
-    /// Point-to-polyline scores, and the world length that one pixel sees at the truth's centre.
-    Polyline(CurveScores, f64),
-}
-
-/// The scores of a row on a case, or the case's id and why there are none.
-type CaseScore = Result<Scored, (String, String)>;
-
 /// A mean with its 95 % interval; a median or quantile has none and repeats its value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Figure {
@@ -141,15 +131,27 @@ pub struct Figure {
     pub high: f64,
 }
 
-/// A measured row: means over the cases that gave a curve, and the cases that did not.
+/// A measured row: means over the cases that gave a curve, and every case by itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
     /// Column name and figure; empty if no case gave a curve.
     pub columns: Vec<(&'static str, Figure)>,
-    /// Cases that were scored.
-    pub scored: usize,
+    /// The cases, in the set's order.
+    pub cases: Vec<CaseOutcome>,
+}
+
+impl Measured {
+    /// Number of cases that were scored.
+    pub fn scored(&self) -> usize {
+        self.cases.len() - self.failures().count()
+    }
+
     /// Case id and reason of each failure.
-    pub failures: Vec<(String, String)>,
+    pub fn failures(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.cases.iter().filter_map(|outcome| {
+            outcome.result.as_ref().err().map(|reason| (outcome.case.as_str(), reason.as_str()))
+        })
+    }
 }
 
 /// A row of the finished table.
@@ -182,6 +184,8 @@ const SPACING_PX: f64 = 0.5;
 pub struct Measuring<'a> {
     /// Which distances are shown.
     pub scores: ScoreKind,
+    /// Whether the [outcomes](Measured::cases) hold both kinds of scores, where curves have both.
+    pub both_scores: bool,
     /// What `accurate` mode on masks and images may correct view 2 by, if anything.
     pub calibration: Option<CalibrationPriors>,
     /// What segments the images; without it the image rows have no figures.
@@ -208,22 +212,27 @@ pub fn measure(
     on_case: &(dyn Fn() + Sync),
 ) -> Result<Table, Error> {
     let with_images = runnable(rows, how).any(|(row, _)| row.input == InputKind::Image);
-    let per_case: Vec<(LengthUnit, Vec<CaseScore>)> = (0..set.len())
+    let per_case: Vec<(LengthUnit, Vec<CaseOutcome>)> = (0..set.len())
         .into_par_iter()
         .map(|index| {
             let pair = set.case(index, with_images)?;
             let segmented = how.segmenter.filter(|_| with_images).map(|segmenter| {
                 segment_images(pair.clone(), segmenter, &unwatched).map_err(|e| e.to_string())
             });
-            let scores = runnable(rows, how)
-                .map(|(row, method)| match (&segmented, row.input) {
-                    (Some(Ok(segmented)), InputKind::Image) => score(segmented, row, method, how),
-                    (Some(Err(reason)), InputKind::Image) => Err((pair.id.clone(), reason.clone())),
-                    _ => score(&pair, row, method, how),
+            let outcomes = runnable(rows, how)
+                .map(|(row, method)| CaseOutcome {
+                    case: pair.id.clone(),
+                    result: match (&segmented, row.input) {
+                        (Some(Ok(segmented)), InputKind::Image) => {
+                            score(segmented, row, method, how)
+                        }
+                        (Some(Err(reason)), InputKind::Image) => Err(reason.clone()),
+                        _ => score(&pair, row, method, how),
+                    },
                 })
                 .collect();
             on_case();
-            Ok((pair.rig.unit(), scores))
+            Ok((pair.rig.unit(), outcomes))
         })
         .collect::<Result<_, Error>>()?;
     let unit = per_case.first().map_or(LengthUnit::Unit, |(unit, _)| *unit);
@@ -231,15 +240,11 @@ pub fn measure(
         return Err(Error::MixedUnits { set: set.name(), units: [unit, *other] });
     }
     let mut measured = Vec::new();
-    for column in 0..runnable(rows, how).count() {
-        let (mut scored, mut failures) = (Vec::new(), Vec::new());
-        for (_, scores) in &per_case {
-            match &scores[column] {
-                Ok(s) => scored.push(*s),
-                Err(failure) => failures.push(failure.clone()),
-            }
-        }
-        measured.push(Measured { columns: columns(&scored)?, scored: scored.len(), failures });
+    for row in 0..runnable(rows, how).count() {
+        let cases: Vec<CaseOutcome> =
+            per_case.iter().map(|(_, outcomes)| outcomes[row].clone()).collect();
+        let scored: Vec<&CaseScores> = cases.iter().flat_map(|outcome| &outcome.result).collect();
+        measured.push(Measured { columns: columns(&scored, how.scores)?, cases });
     }
     let mut measured = measured.into_iter();
     let rows = rows
@@ -271,9 +276,13 @@ fn runs(row: &Row, how: &Measuring<'_>) -> bool {
         && (row.input != InputKind::Image || how.segmenter.is_some())
 }
 
-fn score(pair: &ViewPair, row: &Row, method: crate::Method, how: &Measuring<'_>) -> CaseScore {
-    let fail = |reason: String| (pair.id.clone(), reason);
-    let truth = pair.truth.as_deref().ok_or_else(|| fail("the pair has no truth".to_owned()))?;
+fn score(
+    pair: &ViewPair,
+    row: &Row,
+    method: crate::Method,
+    how: &Measuring<'_>,
+) -> Result<CaseScores, String> {
+    let truth = pair.truth.as_deref().ok_or("the pair has no truth")?;
     let mut params = Params::new(row.input, method);
     params.robust.calibration = how.calibration;
     let reconstruction = match (row.input, how.segmenter) {
@@ -282,17 +291,23 @@ fn score(pair: &ViewPair, row: &Row, method: crate::Method, how: &Measuring<'_>)
         }
         _ => reconstruct(pair, &params),
     };
-    let reconstruction = reconstruction.map_err(|e| fail(e.to_string()))?;
+    let reconstruction = reconstruction.map_err(|e| e.to_string())?;
     let curve = reconstruction.positions();
-    let scored = match how.scores {
-        ScoreKind::Table => table_scores(&curve, truth).map(Scored::Table),
+    let world_per_px = world_per_px(&pair.rig, truth);
+    let points = || table_scores(&curve, truth);
+    let lines = || curve_scores(&curve, truth, SPACING_PX * world_per_px);
+    let said = |e: EvalError| e.to_string();
+    // Of the kind that is not shown a curve may have no scores, as one point after another may be the same.
+    let (table, curve) = match how.scores {
+        ScoreKind::Table => {
+            (Some(points().map_err(said)?), how.both_scores.then(|| lines().ok()).flatten())
+        }
         ScoreKind::Polyline => {
-            let unit_per_px = world_per_px(&pair.rig, truth);
-            curve_scores(&curve, truth, SPACING_PX * unit_per_px)
-                .map(|scores| Scored::Polyline(scores, unit_per_px))
+            (how.both_scores.then(|| points().ok()).flatten(), Some(lines().map_err(said)?))
         }
     };
-    scored.map_err(|e| fail(e.to_string()))
+    let suspicions = reconstruction.diagnostics.suspicions;
+    Ok(CaseScores { table, curve, world_per_px, suspicions })
 }
 
 /// Depth of the truth's centre over the focal length, mean of both views.
@@ -304,15 +319,15 @@ fn world_per_px(rig: &Rig, truth: &[Point3]) -> f64 {
     (one(rig.camera1()) + one(rig.camera2())) / 2.0
 }
 
-/// The Hausdorff distance below which a case counts as right, px.
-const RIGHT_PX: f64 = 5.0;
-
-fn columns(scored: &[Scored]) -> Result<Vec<(&'static str, Figure)>, EvalError> {
-    let table: Vec<TableScores> = scored
-        .iter()
-        .filter_map(|s| if let Scored::Table(t) = s { Some(*t) } else { None })
-        .collect();
-    if !table.is_empty() {
+fn columns(
+    scored: &[&CaseScores],
+    shown: ScoreKind,
+) -> Result<Vec<(&'static str, Figure)>, EvalError> {
+    if scored.is_empty() {
+        return Ok(Vec::new());
+    }
+    if shown == ScoreKind::Table {
+        let table: Vec<TableScores> = scored.iter().filter_map(|s| s.table).collect();
         return Metric::ALL
             .iter()
             .map(|metric| {
@@ -321,16 +336,10 @@ fn columns(scored: &[Scored]) -> Result<Vec<(&'static str, Figure)>, EvalError> 
             })
             .collect();
     }
-    let curve: Vec<(CurveScores, f64)> = scored
-        .iter()
-        .filter_map(|s| if let Scored::Polyline(c, px) = s { Some((*c, *px)) } else { None })
-        .collect();
-    if curve.is_empty() {
-        return Ok(Vec::new());
-    }
-    let overall: Vec<f64> = curve.iter().map(|(c, _)| c.overall).collect();
-    let hausdorff: Vec<f64> = curve.iter().map(|(c, _)| c.hausdorff).collect();
-    let hausdorff_px: Vec<f64> = curve.iter().map(|(c, px)| c.hausdorff / px).collect();
+    let curve: Vec<CurveScores> = scored.iter().filter_map(|s| s.curve).collect();
+    let overall: Vec<f64> = curve.iter().map(|c| c.overall).collect();
+    let hausdorff: Vec<f64> = curve.iter().map(|c| c.hausdorff).collect();
+    let hausdorff_px: Vec<f64> = scored.iter().filter_map(|s| s.hausdorff_px()).collect();
     let point = |values: &[f64], probability| {
         quantile(values, probability).map(|value| Figure { value, low: value, high: value })
     };

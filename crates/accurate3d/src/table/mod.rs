@@ -3,6 +3,7 @@
 
 mod cells;
 mod measure;
+mod outcome;
 mod render;
 mod rows;
 
@@ -11,6 +12,7 @@ pub use cells::{
     write_cells,
 };
 pub use measure::{CaseSet, Figure, Measured, Measuring, PointsProtocol, Table, TableRow, measure};
+pub use outcome::{CaseOutcome, CaseScores, Flags, cases_csv};
 pub use render::{Format, grid, render};
 pub use rows::{Outcome, Row, paper_rows};
 

@@ -118,7 +118,7 @@ pub fn grid(table: &Table) -> (Vec<String>, Vec<Vec<String>>) {
                 });
             }
             cells.push(match &row.result {
-                Ok(m) => format!("{} of {}", m.failures.len(), m.failures.len() + m.scored),
+                Ok(m) => format!("{} of {}", m.failures().count(), m.cases.len()),
                 Err(_) => "-".to_owned(),
             });
             cells
@@ -209,15 +209,15 @@ fn csv(table: &Table) -> String {
             let paper = paper_value(table, row, column).map_or_else(String::new, |v| v.to_string());
             let ours = match &row.result {
                 Ok(m) => m.columns.iter().find(|(n, _)| *n == column).map_or_else(
-                    || format!(",,,{},{},no case gave a curve", m.scored, m.failures.len()),
+                    || format!(",,,{},{},no case gave a curve", m.scored(), m.failures().count()),
                     |(_, i)| {
                         format!(
                             "{},{},{},{},{},",
                             i.value,
                             i.low,
                             i.high,
-                            m.scored,
-                            m.failures.len()
+                            m.scored(),
+                            m.failures().count()
                         )
                     },
                 ),
@@ -325,10 +325,9 @@ fn to_json(table: &Table) -> Value {
                             metric
                         })
                         .collect();
-                    value["scored"] = json!(m.scored);
+                    value["scored"] = json!(m.scored());
                     value["failures"] = m
-                        .failures
-                        .iter()
+                        .failures()
                         .map(|(case, reason)| json!({"case": case, "reason": reason}))
                         .collect();
                 }
