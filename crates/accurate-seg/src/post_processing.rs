@@ -1,3 +1,5 @@
+use std::fmt;
+
 use ndarray::Array2;
 
 use crate::spurs::without_spurs;
@@ -20,6 +22,14 @@ pub struct PostProcessing {
     pub min_length_px: usize,
     /// Side branches that stick out of a strand by at most this are cut off, px; 0 keeps all.
     pub max_spur_px: usize,
+}
+
+impl fmt::Display for PostProcessing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { low, high, min_length_px, max_spur_px } = self;
+        write!(f, "threshold {high} down to {low}, pieces from {min_length_px} px")?;
+        write!(f, ", spurs up to {max_spur_px} px cut")
+    }
 }
 
 impl PostProcessing {

@@ -48,7 +48,8 @@ pub struct SegmentArgs {
     /// Grey images of 8 or 16 bits (PNG, JPEG, TIFF, PNM, BMP) or DICOM runs.
     #[arg(required = true, value_name = "IMAGE")]
     pub images: Vec<PathBuf>,
-    /// Frame of DICOM runs, from 0 (default: the mean over all frames, for bodies at rest).
+    /// Frame of DICOM runs, from 0 (default: the mean over all frames, for bodies at rest); outputs are
+    /// then named NAME_frameINDEX_...
     #[arg(long, value_name = "INDEX")]
     pub frame: Option<u32>,
     /// Folder for NAME_mask.png, NAME_probability.png (16 bits), NAME_overlay.png and

@@ -26,7 +26,6 @@ const WEAK: f32 = 0.6;
 pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
     let jobs = jobs(args)?;
     let polarity = args.grey.polarity();
-    let frame = frame(args)?;
     let segmenter = segmenter_with(&args.model, console, |options, own| NetworkOptions {
         postprocessing: args.threshold.map(|high| PostProcessing { low: WEAK * high, high, ..own }),
         ..options
@@ -34,8 +33,9 @@ pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
     make_folder(&args.out)?;
     let bar = console.progress(jobs.len(), "segmenting");
     let (mut failed, mut first_failure) = (0, None);
-    for (image, name) in &jobs {
-        match one(image, frame, name, &args.out, polarity, &segmenter) {
+    for job in &jobs {
+        let image = &job.image;
+        match one(job, &args.out, polarity, &segmenter) {
             Ok(report) if console.json => console.json(&report)?,
             Ok(report) => console.data(&line(&report))?,
             Err(failure) => {
@@ -57,14 +57,34 @@ pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
     }
 }
 
-/// Images with the name that their outputs begin with.
-fn jobs(args: &SegmentArgs) -> Result<Vec<(PathBuf, String)>, Failure> {
+/// An image to segment.
+struct Job {
+    image: PathBuf,
+    /// What the names of its outputs begin with.
+    name: String,
+    /// What is taken of a DICOM run; none of other images.
+    frame: Option<FrameChoice>,
+}
+
+fn jobs(args: &SegmentArgs) -> Result<Vec<Job>, Failure> {
     let mut names: BTreeMap<String, &Path> = BTreeMap::new();
     let mut jobs = Vec::new();
+    // What cannot be opened is told when its turn comes.
+    let mut takes_frame = args.frame.is_none();
     for image in &args.images {
-        let name = name_of(image).ok_or_else(|| {
+        let mut name = name_of(image).ok_or_else(|| {
             Failure::new(Failure::USAGE, format!("{} names no file", image.display()))
         })?;
+        let dicom = is_dicom(image);
+        takes_frame |= !matches!(dicom, Ok(false));
+        let frame = dicom.is_ok_and(|dicom| dicom).then_some(match args.frame {
+            Some(index) => FrameChoice::One(index),
+            None => FrameChoice::Mean,
+        });
+        // One frame after the other may go into one folder.
+        if let Some(FrameChoice::One(index)) = frame {
+            name += &format!("_frame{index}");
+        }
         if let Some(other) = names.insert(name.clone(), image) {
             let (a, b) = (other.display(), image.display());
             return Err(Failure::new(
@@ -73,7 +93,12 @@ fn jobs(args: &SegmentArgs) -> Result<Vec<(PathBuf, String)>, Failure> {
             )
             .with_hint("run them with different --out folders"));
         }
-        jobs.push((image.clone(), name));
+        jobs.push(Job { image: image.clone(), name, frame });
+    }
+    if let Some(index) = args.frame.filter(|_| !takes_frame) {
+        let message = format!("--frame {index}, with no DICOM run");
+        return Err(Failure::new(Failure::USAGE, message)
+            .with_hint("only DICOM runs have frames: leave --frame out"));
     }
     Ok(jobs)
 }
@@ -87,32 +112,18 @@ fn name_of(image: &Path) -> Option<String> {
     name.map(|name| name.to_string_lossy().into_owned())
 }
 
-/// Which frame of DICOM runs.
-fn frame(args: &SegmentArgs) -> Result<FrameChoice, Failure> {
-    let Some(index) = args.frame else { return Ok(FrameChoice::Mean) };
-    // What cannot be opened is told when its turn comes.
-    if !args.images.iter().any(|image| is_dicom(image).unwrap_or(true)) {
-        let message = format!("--frame {index}, with no DICOM run");
-        return Err(Failure::new(Failure::USAGE, message)
-            .with_hint("only DICOM runs have frames: leave --frame out"));
-    }
-    Ok(FrameChoice::One(index))
-}
-
 fn one(
-    path: &Path,
-    frame: FrameChoice,
-    name: &str,
+    job: &Job,
     out: &Path,
     polarity: Polarity,
     segmenter: &NetworkSegmenter,
 ) -> Result<Value, Failure> {
-    let dicom = is_dicom(path)?;
-    let image = read_picture(path, dicom, frame)?;
-    let frame = match (dicom, frame) {
-        (false, _) => Value::Null,
-        (true, FrameChoice::Mean) => "mean".into(),
-        (true, FrameChoice::One(index)) => index.into(),
+    let Job { image: path, name, frame } = job;
+    let image = read_picture(path, frame.is_some(), frame.unwrap_or(FrameChoice::Mean))?;
+    let frame = match frame {
+        None => Value::Null,
+        Some(FrameChoice::Mean) => "mean".into(),
+        Some(FrameChoice::One(index)) => (*index).into(),
     };
     let found = segmenter.segment(&polarity.with_body_dark(image.clone()), &unwatched)?;
     let skeleton = zhang_suen(&found.mask);

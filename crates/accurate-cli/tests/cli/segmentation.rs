@@ -340,6 +340,10 @@ fn a_dicom_run_is_segmented_by_its_mean_or_by_one_frame() {
     assert_eq!(body(&["--frame", "0"]), 4 * u64::from(side));
     assert_eq!(body(&["--frame", "1"]), 2 * u64::from(side));
     assert_eq!(body(&[]), 6 * u64::from(side));
+    // Nothing was written over: every frame has names of its own.
+    for name in ["run", "run_frame0", "run_frame1"] {
+        assert!(dir.path().join(format!("out/{name}_mask.png")).is_file(), "{name}");
+    }
     let (code, said) = failure(&mut segment(&["--frame", "2"], &run));
     assert_eq!(code, 65, "{said}");
     let image = dir.path().join("out/run_probability.png");

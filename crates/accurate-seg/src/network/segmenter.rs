@@ -245,7 +245,7 @@ impl Segmenter for NetworkSegmenter {
 
     fn describe(&self) -> String {
         format!(
-            "{} (BLAKE3 {}) by {}, images of each: {}, {:?}",
+            "{} (BLAKE3 {}) by {}, images of each: {}, {}",
             self.manifest.name,
             self.hash,
             self.engine.describe(),
