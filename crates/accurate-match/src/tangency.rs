@@ -99,6 +99,7 @@ fn sines<V: View>(
 }
 
 /// A curve as [`bridge`] needs it: arc length and tangency at every point.
+#[cfg_attr(test, derive(Debug))]
 pub(crate) struct Course {
     lengths: Vec<f64>,
     sines: Vec<f64>,
@@ -244,4 +245,140 @@ fn runs(flags: &[bool]) -> Vec<(usize, usize)> {
         start += run.len();
     }
     runs
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const PARAMS: TangencyParams = TangencyParams { max_sine: 0.3, window_px: 4.0 };
+
+    /// A few hundred roundings of lengths below 300 px, over the 0.1 px at least of a step.
+    const TOLERANCE: f64 = 300.0 * f64::EPSILON * 300.0 / 0.1;
+
+    /// Stretches across epipolar lines and along them, in turn.
+    fn courses(points: usize) -> impl Strategy<Value = Course> {
+        let step = (0.1..2.0_f64, prop::bool::weighted(0.15));
+        prop::collection::vec(step, points).prop_map(|steps| {
+            let (mut length, mut tangent) = (0.0, false);
+            let (lengths, sines) = steps
+                .into_iter()
+                .map(|(step, turns)| {
+                    length += step;
+                    tangent ^= turns;
+                    (length, if tangent { 0.01 } else { 0.9 })
+                })
+                .unzip();
+            Course { lengths, sines }
+        })
+    }
+
+    /// Any match that advances; now and then one view stands still.
+    fn cases() -> impl Strategy<Value = (Vec<MatchedPosition>, [Course; 2])> {
+        let step = || prop_oneof![1 => Just(0.0), 4 => 0.1..1.5_f64];
+        let steps = prop::collection::vec((step(), step(), any::<bool>()), 1..60);
+        (steps, courses(100), courses(100)).prop_map(|(steps, one, two)| {
+            let (mut at1, mut at2) = (0.0, 0.0);
+            let matched = steps.into_iter().map(|(step1, step2, exact)| {
+                (at1, at2) = (at1 + step1, at2 + step2);
+                MatchedPosition { at1, at2, exact }
+            });
+            (matched.collect(), [one, two])
+        })
+    }
+
+    /// By the words of [`bridge`]: too near to an epipolar line, or between two such without a window of
+    /// curve between them.
+    fn doubted(matched: &[MatchedPosition], [one, two]: &[Course; 2]) -> Vec<bool> {
+        let tangent = |m: &MatchedPosition| one.sine_at(m.at1) < 0.3 || two.sine_at(m.at2) < 0.3;
+        let along = |m: &MatchedPosition| one.length_at(m.at1) + two.length_at(m.at2);
+        (0..matched.len())
+            .map(|k| {
+                let before = matched[..=k].iter().rfind(|m| tangent(m));
+                let after = matched[k..].iter().find(|m| tangent(m));
+                match (before, after) {
+                    // Along both curves together, so twice.
+                    (Some(a), Some(b)) => tangent(&matched[k]) || along(b) - along(a) < 8.0,
+                    _ => false,
+                }
+            })
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn trusted_matches_and_the_ends_stay_and_the_bridges_advance_between_them(
+            (matched, courses) in cases(),
+        ) {
+            let [one, two] = &courses;
+            let bridged = bridge(&matched, one, two, &PARAMS);
+            let doubted = doubted(&matched, &courses);
+            let flag = |m: &MatchedPosition| if m.exact { PointFlag::Exact } else { PointFlag::Nearest };
+            let trusted: Vec<_> = matched.iter().zip(&doubted).filter(|(_, doubted)| !**doubted)
+                .map(|(m, _)| (*m, flag(m))).collect();
+            let kept: Vec<_> =
+                bridged.iter().copied().filter(|(_, flag)| *flag != PointFlag::Bridged).collect();
+            prop_assert_eq!(kept, trusted);
+            for (given, found) in [(matched.first(), bridged.first()), (matched.last(), bridged.last())] {
+                let (given, found) = (given.unwrap(), found.unwrap().0);
+                prop_assert_eq!((given.at1, given.at2), (found.at1, found.at2));
+            }
+            for pair in bridged.windows(2) {
+                let (a, b) = (pair[0].0, pair[1].0);
+                prop_assert!(b.at1 - a.at1 >= -TOLERANCE && b.at2 - a.at2 >= -TOLERANCE, "{:?} {:?}", a, b);
+            }
+            let all = bridge(&matched, one, two, &TangencyParams { max_sine: 0.0, ..PARAMS });
+            prop_assert_eq!(all, matched.iter().map(|m| (*m, flag(m))).collect::<Vec<_>>());
+        }
+
+        /// Whatever was matched within: the cubic of the textbook, in equal steps along both curves.
+        #[test]
+        fn a_bridge_is_the_cubic_with_the_values_and_slopes_of_its_sides(
+            mut one in courses(300), mut two in courses(300), before in 0.1..0.9_f64, mean in 0.05..0.95_f64,
+            after in 0.1..0.9_f64, width in 25.0..40.0_f64, stray in -0.2..0.2_f64,
+        ) {
+            // From 30 px along either curve on; in the middle of the gap one stray match.
+            let sides = |w: f64| match w {
+                w if w <= 0.0 => before * w,
+                w if w >= width => mean * width + after * (w - width),
+                w => mean * w + stray * mean.min(1.0 - mean) * width,
+            };
+            let beyond = (0..30).map(|k| width + f64::from(k));
+            let marks = (-30..=0).map(f64::from).chain([0.5 * width]).chain(beyond);
+            let matched: Vec<_> = marks
+                .map(|w| {
+                    let s1 = sides(w);
+                    let (at1, at2) = (one.at_length(30.0 + s1), two.at_length(30.0 + w - s1));
+                    MatchedPosition { at1, at2, exact: true }
+                })
+                .collect();
+            // Only that one is doubted, in the view that advances more.
+            one.sines = vec![1.0; 300];
+            two.sines = vec![1.0; 300];
+            let (sines, at) = if mean > 0.5 {
+                (&mut one.sines, [30, 31, 32].map(|k: usize| matched[k].at1))
+            } else {
+                (&mut two.sines, [30, 31, 32].map(|k: usize| matched[k].at2))
+            };
+            prop_assume!(at[1] - at[0] > 2.0 && at[2] - at[1] > 2.0);
+            sines[at[1].floor() as usize..=at[1].ceil() as usize].fill(0.0);
+
+            let bounded = |slope: f64| slope.min(3.0 * mean).max(1.0 - 3.0 * (1.0 - mean));
+            let (p, q) = (width * bounded(before), width * bounded(after));
+            let found = bridge(&matched, &one, &two, &PARAMS);
+            let inside: Vec<_> = found.iter().filter(|(_, flag)| *flag == PointFlag::Bridged).collect();
+            prop_assert_eq!(found.len() - inside.len(), matched.len() - 1);
+            for (k, (m, _)) in inside.iter().enumerate() {
+                let t = (k + 1) as f64 / (inside.len() + 1) as f64;
+                let s1 = (t.powi(3) - 2.0 * t * t + t) * p
+                    + (3.0 * t * t - 2.0 * t.powi(3)) * mean * width
+                    + (t.powi(3) - t * t) * q;
+                let off1 = one.length_at(m.at1) - 30.0 - s1;
+                let off2 = two.length_at(m.at2) - 30.0 - (t * width - s1);
+                prop_assert!(off1.abs().max(off2.abs()) <= TOLERANCE, "{} {} at {}", off1, off2, t);
+            }
+        }
+    }
 }

@@ -13,7 +13,7 @@ pub struct CentrelineParams {
     /// Standard deviation of the points per coordinate, px. Rounding to integers: 1/sqrt(12).
     pub sigma_px: f64,
     /// Distance of the points of the result, px, along the chords of the given points: in tight bends some
-    /// are up to an eighth farther apart.
+    /// are up to two fifths farther apart (0.4 radians a px).
     pub spacing_px: f64,
 }
 

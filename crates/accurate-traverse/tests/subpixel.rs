@@ -2,7 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use accurate_geom::{Pixel, View1};
-use accurate_traverse::{GraphParams, SkeletonGraph, TraverseError, extend_to_body_ends, recentre};
+use accurate_traverse::{
+    CentrelineParams, GraphParams, SkeletonGraph, TraverseError, extend_to_body_ends, recentre,
+    smooth_centreline,
+};
 use ndarray::Array2;
 use proptest::prelude::*;
 
@@ -100,6 +103,67 @@ proptest! {
         // What reaches the end already stays.
         let again = extend_to_body_ends(&whole, &radii, 2.0 * half).unwrap();
         prop_assert!(again[0].distance(whole[0]) < 1.0);
+    }
+}
+
+/// A slowly turning line that zigzags by half a pixel, in steps of exactly 1 px: no smooth curve is nearer
+/// to it than noise of the default would be.
+fn zigzags() -> impl Strategy<Value = Vec<Pixel<View1>>> {
+    let turns = prop::collection::vec(-0.1..0.1f64, 20..60);
+    (turns, 0.0..6.2f64, 1.1..1.3f64).prop_map(|(turns, mut heading, half_angle)| {
+        let (mut at, mut side) = (Pixel::new(300.0, 200.0), half_angle);
+        let mut step = |turn: &f64| {
+            (heading, side) = (heading + turn, -side);
+            at = Pixel::new(at.x + (heading + side).cos(), at.y + (heading + side).sin());
+            at
+        };
+        turns.iter().map(&mut step).collect()
+    })
+}
+
+/// Two points per step of 1 px; a little more, lest rounding add one.
+const HALVES: CentrelineParams =
+    CentrelineParams { spacing_px: 0.5 * (1.0 + 1e-9), ..CentrelineParams::DEFAULT };
+
+fn smoothed(points: &[Pixel<View1>]) -> Vec<Pixel<View1>> {
+    smooth_centreline(points, &HALVES).unwrap()
+}
+
+proptest! {
+    #[test]
+    fn a_centreline_is_as_far_from_its_points_as_noise_would_be_in_either_direction_and_turned(
+        points in zigzags(), twice in prop::collection::vec(1..3usize, 60),
+    ) {
+        let (n, line) = (points.len(), smoothed(&points));
+        prop_assert_eq!(line.len(), 2 * n - 1);
+        let sum: f64 = (0..n).map(|k| line[2 * k].distance(points[k]).powi(2)).sum();
+        // Of two coordinates each; the fit is asked for a relative 1e-6.
+        let expected = 2.0 * n as f64 * CentrelineParams::DEFAULT.sigma_px.powi(2);
+        prop_assert!((sum / expected - 1.0).abs() < 2e-6, "{sum} {expected}");
+        // Of all curves as smooth, each is the nearest to the points. Two of them whose sums of squares
+        // differ by d are then at most the root of d apart.
+        let slack = (2e-6 * expected).sqrt();
+        let moved = |p: &Pixel<View1>| Pixel::new(50.0 - p.y, 20.0 + p.x);
+        let turned = smoothed(&points.iter().map(moved).collect::<Vec<_>>());
+        let backwards = smoothed(&points.iter().rev().copied().collect::<Vec<_>>());
+        prop_assert_eq!((turned.len(), backwards.len()), (line.len(), line.len()));
+        for k in (0..line.len()).step_by(2) {
+            prop_assert!(turned[k].distance(moved(&line[k])) <= slack);
+            prop_assert!(backwards[line.len() - 1 - k].distance(line[k]) <= slack);
+        }
+        let doubled: Vec<_> = points.iter().zip(&twice).flat_map(|(p, n)| vec![*p; *n]).collect();
+        prop_assert_eq!(smoothed(&doubled), line);
+    }
+}
+
+#[test]
+fn fewer_than_four_different_points_are_their_own_centreline() {
+    let at = |x: f64| Pixel::<View1>::new(x, 2.0 * x);
+    for different in
+        [vec![], vec![at(1.0)], vec![at(1.0), at(2.0)], vec![at(1.0), at(2.0), at(1.0)]]
+    {
+        let twice: Vec<_> = different.iter().flat_map(|p| [*p, *p]).collect();
+        assert_eq!(smoothed(&twice), different);
     }
 }
 

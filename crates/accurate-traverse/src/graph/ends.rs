@@ -74,6 +74,10 @@ pub(super) fn stretch<V: View>(
             }
         }
         let Some((distance, pixel, edge, index)) = target else { continue };
+        // An edge drawn out to another piece has reached it.
+        if distance <= 0.5 * mask_thickness_px {
+            continue;
+        }
         let line = &mut edges[edge];
         let last = line.points.len() - 1;
         let from = line.points[index].point();
@@ -193,5 +197,117 @@ fn bump<V: View>(line: &mut GraphEdge<V>, index: usize, shift: Vector2<f64>) {
         let away = (k as f64 - index as f64) / sigma;
         let moved = point.point() + shift * (-0.5 * away * away).exp();
         *point = moved.into();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::View1;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const THICKNESS: f64 = 4.0;
+
+    /// The pixels within `half` of any of these points.
+    fn mask(middle: &[Point2], half: f64) -> Array2<f64> {
+        Array2::from_shape_fn((100, 100), |(y, x)| {
+            let at = Point2::new(x as f64, y as f64);
+            f64::from(u8::from(middle.iter().any(|p| (at - p).norm() <= half)))
+        })
+    }
+
+    fn line(from: Point2, direction: f64, length: f64) -> Vec<Point2> {
+        let steps = length.ceil().max(1.0);
+        let ahead = Vector2::new(direction.cos(), direction.sin());
+        (0..=steps as usize).map(|k| from + ahead * (length * k as f64 / steps)).collect()
+    }
+
+    fn edge(points: &[Point2]) -> GraphEdge<View1> {
+        GraphEdge::body(
+            [0, 1],
+            points.iter().copied().map(Pixel::from).collect(),
+            vec![1.0; points.len()],
+        )
+    }
+
+    proptest! {
+        /// The body bends at its tip, by less than a right angle: the tip is then what is nearest.
+        #[test]
+        fn a_tip_reaches_to_half_a_thickness_before_the_farthest_pixel_ahead(
+            direction in 0.0..6.2_f64, bend in -1.4..1.4_f64, arm in 0.0..13.0_f64, at_start: bool,
+            is_tip: bool,
+        ) {
+            let mut points = line(Point2::new(50.0, 50.0), direction, 25.0);
+            let tip = points[25];
+            let radii = mask(&[points.clone(), line(tip, direction + bend, arm)].concat(), THICKNESS / 2.0);
+            if at_start {
+                points.reverse();
+            }
+            let before = edge(&points);
+            let mut edges = [before.clone()];
+            stretch(&mut edges, &[[at_start && is_tip, !at_start && is_tip]], &radii, THICKNESS);
+            let [after] = edges;
+            let far = |at: &Point2| points.iter().map(|p| (at - p).norm()).fold(f64::INFINITY, f64::min);
+            let mut set: Vec<_> = radii.indexed_iter().filter(|(_, r)| **r > 0.0)
+                .map(|((y, x), _)| Point2::new(x as f64, y as f64)).collect();
+            set.sort_by(|a, b| far(b).total_cmp(&far(a)));
+            let (farthest, beyond) = (set[0], far(&set[0]) - THICKNESS - 0.5);
+            if !is_tip || beyond <= 0.0 {
+                prop_assert_eq!(after, before);
+                return Ok(());
+            }
+            // Of less than that, single pixels may be pieces of their own; of two as far either counts.
+            prop_assume!(beyond > 1.5 && far(&set[0]) - far(&set[1]) > 1e-9);
+            let (kept, end) = if at_start {
+                (&after.points[after.points.len() - 26..], after.points[0])
+            } else {
+                (&after.points[..26], after.points[after.points.len() - 1])
+            };
+            prop_assert_eq!(kept, &before.points[..]);
+            // Roundings of coordinates below 100 px.
+            let expected = tip + (farthest - tip) * (1.0 - 0.5 * THICKNESS / far(&farthest));
+            prop_assert!((end.point() - expected).norm() < 1e-12, "{} {}", end.point(), expected);
+            prop_assert_eq!(after.radii.len(), after.points.len());
+            let steps = after.points.windows(2).map(|w| w[0].distance(w[1]));
+            prop_assert_eq!(after.length_px, steps.clone().sum::<f64>());
+            prop_assert!(steps.fold(0.0, f64::max) <= 1.0 + 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_turn_of_a_hairpin_moves_out_and_its_ends_stay() {
+        // Two strands 2 px apart; the body turns 8 px beyond the line, which a tip could not tell.
+        let half = line(Point2::new(20.0, 51.0), 0.0, 30.0);
+        let back: Vec<_> = half.iter().rev().map(|p| Point2::new(p.x, 49.0)).collect();
+        let before = edge(&[half, vec![Point2::new(51.0, 50.0)], back].concat());
+        let radii = mask(&line(Point2::new(20.0, 50.0), 0.0, 37.0), 2.0);
+        let mut edges = [before.clone()];
+        stretch(&mut edges, &[[true, true]], &radii, THICKNESS);
+        let after = &edges[0].points;
+        // The mask ends at 59; half a thickness before that is where it turns.
+        assert_eq!((after.len(), after[31]), (63, Pixel::new(57.0, 50.0)));
+        assert_eq!([after[0], after[62]], [before.points[0], before.points[62]]);
+    }
+
+    #[test]
+    fn what_is_too_far_is_not_of_this_body_and_what_was_reached_is_done() {
+        let drawn = |set: &[(usize, usize)]| {
+            let pixel = |(y, x)| f64::from(u8::from(set.contains(&(x, y))));
+            let mut edges = [edge(&line(Point2::new(60.0, 50.0), 0.0, 20.0))];
+            stretch(
+                &mut edges,
+                &[[true, true]],
+                &Array2::from_shape_fn((100, 100), pixel),
+                THICKNESS,
+            );
+            edges[0].points[0]
+        };
+        let at = |x| Pixel::new(x, 50.0);
+        assert_eq!([drawn(&[(44, 50)]), drawn(&[(43, 50)])], [at(46.0), at(60.0)]);
+        // The second speck lies at the end that was drawn out to the first, or beside it.
+        for second in [(48, 50), (48, 51)] {
+            assert_eq!(drawn(&[(46, 50), second]), at(48.0), "{second:?}");
+        }
     }
 }

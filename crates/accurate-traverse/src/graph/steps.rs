@@ -80,3 +80,64 @@ fn widths<V: View>(edge: &GraphEdge<V>, radii: &Array2<f64>, most: f64) -> Vec<f
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use accurate_geom::{Pixel, View1};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// A straight bar, wider on some stretch by whole pixels on either side.
+        #[test]
+        fn a_long_wide_stretch_is_cut_where_it_begins_and_ends(
+            half in 2..5_usize, start in 25..50_usize, length in 0..32_usize,
+            more in [0..3_usize, 0..3_usize], upright: bool,
+        ) {
+            let wide = |k: usize| (start..start + length).contains(&k);
+            let inside = |k: usize, across: usize| {
+                across.abs_diff(20) <= half + if wide(k) { more[usize::from(across < 20)] } else { 0 }
+            };
+            let radii = Array2::from_shape_fn((120, 120), |(y, x)| {
+                let (k, across) = if upright { (y, x) } else { (x, y) };
+                f64::from(u8::from(inside(k, across)))
+            });
+            let points: Vec<Pixel<View1>> = (5..115)
+                .map(f64::from)
+                .map(|k| if upright { Pixel::new(20.0, k) } else { Pixel::new(k, 20.0) })
+                .collect();
+            let whole = GraphEdge::body([0, 1], points.clone(), vec![1.0; 110]);
+            let tip = |at| GraphNode { at, degree: 1, kind: NodeKind::Tip };
+            let mut nodes = vec![tip(points[0]), tip(points[109])];
+            let mut edges = vec![whole.clone()];
+            let params = GraphParams { step_length_px: 15.0, ..GraphParams::DEFAULT };
+            split(&mut nodes, &mut edges, &radii, (2 * half + 1) as f64, &params);
+            // Widths are averaged over 3 px on both sides, which lengthens a stretch by at most those.
+            // It does not shorten one: at its ends 4 of 7 px are wide by 2 px, and 8 / 7 px exceed the step.
+            let counts = more[0].min(more[1]) > 0;
+            if !counts || length + 6 < 15 {
+                prop_assert_eq!((nodes.len(), edges), (2, vec![whole]));
+            } else if length >= 15 {
+                prop_assert_eq!((nodes.len(), edges.len()), (4, 3));
+                let mut cuts: Vec<f64> = Vec::new();
+                for node in &nodes[2..] {
+                    prop_assert_eq!((node.kind, node.degree), (NodeKind::WidthStep, 2));
+                    cuts.push(if upright { node.at.y } else { node.at.x });
+                }
+                cuts.sort_by(f64::total_cmp);
+                prop_assert!((cuts[0] - start as f64).abs() <= 3.0, "{:?}", cuts);
+                prop_assert!((cuts[1] - (start + length - 1) as f64).abs() <= 3.0, "{:?}", cuts);
+                // In order, the parts are the whole.
+                let (mut joined, mut node) = (vec![points[0]], 0);
+                for _ in 0..3 {
+                    let part = edges.iter().find(|edge| edge.ends[0] == node).unwrap();
+                    prop_assert_eq!(part.points[0], nodes[node].at);
+                    joined.extend_from_slice(&part.points[1..]);
+                    node = part.ends[1];
+                }
+                prop_assert_eq!((joined, node), (points, 1));
+            }
+        }
+    }
+}
