@@ -109,9 +109,19 @@ impl<'p> CsvTable<'p> {
                 self.path,
                 "CSV",
                 Some(1),
-                format!("no column `{name}` in the header"),
+                format!("no column `{name}` in the header `{}`", self.shown_header()),
             )
         })
+    }
+
+    /// The header as it was read, for a message: no more of it than fits a line.
+    fn shown_header(&self) -> String {
+        const MOST: usize = 60;
+        let whole = self.header.join(",");
+        match whole.char_indices().nth(MOST) {
+            Some((end, _)) => format!("{}...", &whole[..end]),
+            None => whole,
+        }
     }
 
     /// Calls `visit` with the line (from 1) and the fields of every row below the header.
@@ -186,10 +196,11 @@ mod tests {
 
     #[test]
     fn each_defect_names_its_line() {
-        let cases: [(&[u8], &str); 7] = [
-            (b"", "no column `x` in the header"),
+        let cases: [(&[u8], &str); 8] = [
+            (b"", "no column `x` in the header ``"),
             (b"x,y\n", "no points"),
-            (b"1,2\n3,4\n", "no column `x` in the header"),
+            (b"1,2\n3,4\n", "no column `x` in the header `1,2`"),
+            (b"x;y\n3;4\n", "no column `x` in the header `x;y`"),
             (b"x,y\n1,2\n3\n", "line 3: not valid CSV: 1 fields where the header has 2"),
             (b"x,y\n1,2\n3,a\n", "line 3, column 2: `a` is not a number"),
             (b"x,y\n1,inf\n", "line 2, column 2 is not finite: inf"),

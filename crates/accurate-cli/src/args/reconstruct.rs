@@ -30,7 +30,7 @@ pub struct ReconstructArgs {
     /// Folder for curve.csv and result.json (with several pairs, one folder a case below it), or a
     /// file whose extension says what it is to hold: .csv, .ply, .vtp, .mrk.json, .npy, .npz,
     /// .parquet, .svg or .png (picture), .html (report), .json (result). May be given several times.
-    #[arg(short, long, required = true, value_name = "DIR|FILE")]
+    #[arg(short, long, required_unless_present = "report", value_name = "DIR|FILE")]
     pub out: Vec<PathBuf>,
     /// Files to write into the folder besides curve.csv and result.json.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "KINDS")]

@@ -367,13 +367,33 @@ pub fn summary(reconstruction: &Reconstruction) -> String {
     let reasons = d.reasons().join(", ");
     let suspect = if reasons.is_empty() { reasons } else { format!(", suspect: {reasons}") };
     format!(
-        "{}: {} points, {:.1} {}, mean epipolar distance {:.2} px, coverage {:.1} % / {:.1} %{suspect}",
+        "{}: {} points, {} {}, mean epipolar distance {:.2} px, coverage {:.1} % / {:.1} %{suspect}",
         reconstruction.id,
         reconstruction.points.len(),
-        reconstruction.length(),
+        four_digits(reconstruction.length()),
         reconstruction.unit,
         d.mean_epipolar_distance_px,
         100.0 * d.trace_coverage[0] * d.matched_fraction[0],
         100.0 * d.trace_coverage[1] * d.matched_fraction[1],
     )
+}
+
+/// A length of any unit, to four digits at least and one decimal.
+fn four_digits(length: f64) -> String {
+    let decimals = (3 - length.abs().max(1e-6).log10().floor() as i32).max(1);
+    format!("{length:.*}", decimals as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_have_digits_in_any_unit() {
+        for (length, said) in
+            [(708.06, "708.1"), (12345.6, "12345.6"), (0.116_63, "0.1166"), (0.0, "0.000000000")]
+        {
+            assert_eq!(four_digits(length), said);
+        }
+    }
 }

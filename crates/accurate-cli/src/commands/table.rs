@@ -25,6 +25,13 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
     if let Some(cells) = &args.check {
         return check(cells, args, console);
     }
+    let mut seeds = args.seeds.clone();
+    seeds.sort_unstable();
+    seeds.dedup();
+    if seeds.len() < args.seeds.len() {
+        return Err(Failure::new(Failure::USAGE, "--seeds names a seed twice")
+            .with_hint("the same cases, counted twice, say nothing more"));
+    }
     let set = case_set(args)?;
     if set.is_empty() {
         return Err(Failure::new(Failure::USAGE, "the table has no case")
@@ -128,6 +135,12 @@ fn case_set(args: &TableArgs) -> Result<CaseSet, Failure> {
                 return Err(Failure::new(Failure::USAGE, unknown.to_string())
                     .with_hint("or give a folder of pair folders with truth"));
             }
+            let of_families = options_of_families(args);
+            if !of_families.is_empty() {
+                let message = format!("{}: is of generated sets", of_families.join(", "));
+                return Err(Failure::new(Failure::USAGE, message)
+                    .with_hint("the pairs of a folder are measured as they are: leave it out"));
+            }
             // A part that a pair lacks fails that pair's row, which says so; truth it must have.
             let parts = PairParts {
                 points: path_has(path, "points"),
@@ -142,6 +155,24 @@ fn case_set(args: &TableArgs) -> Result<CaseSet, Failure> {
             Ok(CaseSet::Given { name: args.set.clone(), pairs })
         }
     }
+}
+
+/// Options that say how cases are generated, where they say anything.
+fn options_of_families(args: &TableArgs) -> Vec<&'static str> {
+    let made = &args.disturbances;
+    [
+        (args.seeds != [1, 2, 3, 4, 5], "--seeds"),
+        (args.cases != 26, "--cases"),
+        (args.points != PointsKind::Rounded, "--points"),
+        (made.mask_thickness_px.is_some(), "--mask-thickness-px"),
+        (made.occlusions.is_some(), "--occlusions"),
+        (made.occlusion_radius_px != 8.0, "--occlusion-radius-px"),
+        (made.calibration_rotation_deg != 0.0, "--calibration-rotation-deg"),
+        (made.calibration_shift_px != 0.0, "--calibration-shift-px"),
+    ]
+    .into_iter()
+    .filter_map(|(given, name)| given.then_some(name))
+    .collect()
 }
 
 fn path_has(set: &Path, part: &str) -> bool {

@@ -293,9 +293,30 @@ fn a_folder_of_pairs_can_be_tabled_if_they_are_in_one_unit() {
     for row in found["rows"].as_array().unwrap() {
         assert_eq!(row["scored"], 2, "{row}");
     }
+    // What says how cases are generated says nothing here.
+    for option in [["--occlusions", "1-2"], ["--cases", "1"], ["--calibration-shift-px", "3"]] {
+        let (code, message) = failure(table().args(option));
+        assert!(code == 2 && message.contains(option[0]), "{option:?}: {code} {message}");
+    }
     copy_of("wire", dir.path());
     let (code, message) = failure(&mut table());
     assert!(code == 65 && message.contains("pairs in unit and in mm"), "{code} {message}");
+}
+
+#[test]
+fn a_seed_counts_once_and_a_report_is_an_output() {
+    let (code, message) = failure(accurate().args(["table", "--seeds", "7,7", "--cases", "1"]));
+    assert!(code == 2 && message.contains("twice"), "{code} {message}");
+    let dir = TempDir::new().unwrap();
+    let page = dir.path().join("r.html");
+    let mut command = accurate();
+    command
+        .args(["reconstruct", "-i", "points", "--report"])
+        .arg(&page)
+        .arg(samples().join("bend"));
+    stdout(&mut command);
+    assert!(fs::read_to_string(&page).unwrap().contains("</html>"));
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
 }
 
 #[test]
