@@ -100,7 +100,16 @@ impl Reconstruction {
         CurveTable { unit: self.unit, points: self.positions(), columns }
     }
 
-    /// `sigma`, the largest standard deviation in any direction, and the covariance's six entries.
+    /// The largest standard deviation of each point across the curve, in the rig's unit, if the method gives
+    /// an uncertainty: where a point lies along it is a matter of parametrisation, and moves no curve.
+    pub fn sigmas_across(&self) -> Option<Vec<f64>> {
+        let positions = self.positions();
+        let of = |(i, covariance)| sigma_across(&positions, i, covariance);
+        self.covariances.as_ref().map(|list| list.iter().enumerate().map(of).collect())
+    }
+
+    /// `sigma`, the largest standard deviation in any direction, `sigma_across`, and the covariance's six
+    /// entries.
     fn uncertainty_columns(&self) -> Vec<Column> {
         let Some(covariances) = &self.covariances else { return Vec::new() };
         let unit = self.unit.label();
@@ -110,6 +119,11 @@ impl Reconstruction {
             values: covariances.iter().map(value).collect(),
         };
         let mut columns = vec![column("sigma", unit.to_owned(), &largest_sigma)];
+        columns.extend(self.sigmas_across().map(|values| Column {
+            name: "sigma_across".to_owned(),
+            unit: unit.to_owned(),
+            values,
+        }));
         for (name, row, col) in [
             ("cov_xx", 0, 0),
             ("cov_xy", 0, 1),
@@ -124,8 +138,19 @@ impl Reconstruction {
     }
 }
 
+fn sigma_across(points: &[Point3], i: usize, covariance: &Matrix3<f64>) -> f64 {
+    let (before, after) = (i.saturating_sub(1), (i + 1).min(points.len() - 1));
+    match (points[after] - points[before]).try_normalize(0.0) {
+        Some(along) => {
+            let across = Matrix3::identity() - along * along.transpose();
+            largest_sigma(&(across * covariance * across))
+        }
+        None => largest_sigma(covariance),
+    }
+}
+
 /// Square root of the largest eigenvalue.
-pub(crate) fn largest_sigma(covariance: &Matrix3<f64>) -> f64 {
+fn largest_sigma(covariance: &Matrix3<f64>) -> f64 {
     covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
 }
 
@@ -177,5 +202,20 @@ impl Traces {
             points2: trace2.points,
             view2_reversed: false,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_moves_points_along_the_curve_is_no_uncertainty_of_it() {
+        let line = [0.0, 1.0, 2.0].map(|x| Point3::new(x, 0.0, 0.0));
+        let covariance = Matrix3::from_diagonal(&[100.0, 4.0, 1.0].into());
+        for i in 0..3 {
+            assert!((sigma_across(&line, i, &covariance) - 2.0).abs() < 1e-12);
+        }
+        assert!((sigma_across(&line[..1], 0, &covariance) - 10.0).abs() < 1e-12);
     }
 }

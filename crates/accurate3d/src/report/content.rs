@@ -4,7 +4,6 @@ use serde_json::{Value, json};
 
 use super::Provenance;
 use super::images::{cost_image, view_image};
-use crate::reconstruction::largest_sigma;
 use crate::{ConsideredCurve, Error, NOT_FOR_CLINICAL_USE, Reconstruction, ViewPair};
 
 /// Everything the page shows, as it expects it.
@@ -69,10 +68,8 @@ fn curve(r: &Reconstruction, digits: WorldDigits) -> Value {
         })
         .collect();
     let positions = r.positions();
-    let sigma = r.covariances.as_ref().map(|list| {
-        let across = |(i, c): (usize, &Matrix3<f64>)| significant(sigma_across(&positions, i, c));
-        list.iter().enumerate().map(across).collect::<Vec<_>>()
-    });
+    let sigma =
+        r.sigmas_across().map(|sigmas| sigmas.into_iter().map(significant).collect::<Vec<_>>());
     json!({
         "points": digits.points(&positions),
         "arc": arc,
@@ -82,19 +79,6 @@ fn curve(r: &Reconstruction, digits: WorldDigits) -> Value {
         "pixels2": pixels(r.points.iter().map(|p| &p.pixel2)),
         "distance": r.points.iter().map(|p| hundredth(p.epipolar_distance_px)).collect::<Vec<_>>(),
     })
-}
-
-/// The largest standard deviation across the curve: where a point lies along it is a matter of
-/// parametrisation, and moves no curve.
-fn sigma_across(points: &[Point3], i: usize, covariance: &Matrix3<f64>) -> f64 {
-    let (before, after) = (i.saturating_sub(1), (i + 1).min(points.len() - 1));
-    match (points[after] - points[before]).try_normalize(0.0) {
-        Some(along) => {
-            let across = Matrix3::identity() - along * along.transpose();
-            largest_sigma(&(across * covariance * across))
-        }
-        None => largest_sigma(covariance),
-    }
 }
 
 fn view(
@@ -189,16 +173,6 @@ impl WorldDigits {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_moves_points_along_the_curve_is_no_uncertainty_of_it() {
-        let line = [0.0, 1.0, 2.0].map(|x| Point3::new(x, 0.0, 0.0));
-        let covariance = Matrix3::from_diagonal(&[100.0, 4.0, 1.0].into());
-        for i in 0..3 {
-            assert!((sigma_across(&line, i, &covariance) - 2.0).abs() < 1e-12);
-        }
-        assert!((sigma_across(&line[..1], 0, &covariance) - 10.0).abs() < 1e-12);
-    }
 
     #[test]
     fn rounding_keeps_the_digits_it_names() {
