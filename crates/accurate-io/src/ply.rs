@@ -31,9 +31,9 @@ pub enum PlyEncoding {
 ///
 /// # Errors
 /// [`IoError::Malformed`], also for a vertex with more numbers than properties and for bytes behind
-/// the declared vertices where no other element follows; [`IoError::TooLarge`] if the header declares
-/// more elements than the file has bytes for, before memory is taken; [`IoError::NotFinite`];
-/// [`IoError::Empty`]; [`IoError::Missing`].
+/// the declared vertices where no other element follows, and if the header declares more elements than
+/// the file has bytes for, before memory is taken; [`IoError::NotFinite`]; [`IoError::Empty`];
+/// [`IoError::Missing`].
 pub fn read_ply_points(path: &Path) -> Result<Vec<Point3>, IoError> {
     let (points, _) = parse(path)?;
     for (i, p) in points.iter().enumerate() {
@@ -203,12 +203,12 @@ fn check_counts(path: &Path, header: &Header, remaining: u64) -> Result<(), IoEr
         // An element without properties costs no bytes: nothing would bound its count.
         let fitting = (left + 1).checked_div(least_bytes).unwrap_or(0);
         if count > fitting {
-            return Err(IoError::TooLarge {
-                path: path.to_owned(),
-                what: format!("declared number of `{}`", crate::error::cut(name, 40)),
-                found: count,
-                limit: fitting,
-            });
+            let name = crate::error::cut(name, 40);
+            let reason = format!(
+                "the header declares {count} of `{name}`, what follows has bytes for {fitting} at most: \
+                 is the file cut off?"
+            );
+            return Err(IoError::malformed(path, "PLY", None, reason));
         }
         left = left.saturating_sub(count * least_bytes);
     }

@@ -214,11 +214,17 @@ impl Diagnostics {
         adjustment: Adjustment,
     ) -> Self {
         let Adjustment { refusal, fit, calibration } = adjustment;
-        let mut suspicions = suspicions(matched.mean_epipolar_distance_px, 1.0, [1.0; 2]);
-        let misfit = fit.is_some_and(|fit| fit.chi2_per_point > MOST_CHI2_PER_POINT);
+        let fraction = |range: &Range<usize>, count: usize| range.len() as f64 / count as f64;
+        let matched_fraction =
+            [fraction(&matched.matched1, counts[0]), fraction(&matched.matched2, counts[1])];
+        // One view may see more of the body, at either end; that each sees what the other does not is rare.
+        let both = [matched_fraction[0].max(matched_fraction[1]); 2];
+        let mut suspicions = suspicions(matched.mean_epipolar_distance_px, 1.0, both);
+        let misfit = fit.is_some_and(|fit| {
+            fit.chi2_per_point > MOST_CHI2_PER_POINT && fit.rms_px[1] > MISFIT_PX
+        });
         suspicions.extend(misfit.then_some(Suspicion::Misfit));
         suspicions.extend(refusal.is_some().then_some(Suspicion::NotAdjusted));
-        let fraction = |range: &Range<usize>, count: usize| range.len() as f64 / count as f64;
         Self {
             mean_epipolar_distance_px: matched.mean_epipolar_distance_px,
             max_epipolar_distance_px: refusal.as_ref().and_then(|_| {
@@ -226,10 +232,7 @@ impl Diagnostics {
             }),
             trace_coverage: [1.0; 2],
             trace_jumps: [0; 2],
-            matched_fraction: [
-                fraction(&matched.matched1, counts[0]),
-                fraction(&matched.matched2, counts[1]),
-            ],
+            matched_fraction,
             view2_reversed: matched.reversed,
             dropped_pairs: matched.dropped,
             along_epipolar_line: share(along_epipolar_line),
@@ -292,6 +295,9 @@ fn share(flags: &[bool]) -> f64 {
 
 /// Rounded points leave 1 if the curve is right, and about 1.2 if they also jump by a pixel at corners.
 const MOST_CHI2_PER_POINT: f64 = 1.5;
+
+/// Points without noise lie no farther from a spline than it bends between its knots, px.
+const MISFIT_PX: f64 = 0.05;
 
 /// A trace that leaves out more of a skeleton than a few spurs.
 const LEAST_COVERAGE: f64 = 0.95;

@@ -28,13 +28,20 @@ impl Diagnostics {
                 Some(format!("mean epipolar distance {:.2} px", self.mean_epipolar_distance_px))
             }
             Suspicion::Uncovered => {
-                let covered = self.trace_coverage[0].min(self.trace_coverage[1]);
+                // Of ordered points the larger part that has partners decides.
+                let covered = self.trace_coverage[0]
+                    .min(self.trace_coverage[1])
+                    .min(self.matched_fraction[0].max(self.matched_fraction[1]));
                 let uncovered = evidence.map_or(1.0 - covered, |e| e.uncovered);
                 Some(format!("{:.0} %", 100.0 * uncovered))
             }
             Suspicion::Uncertain => {
                 evidence.map(|e| format!("standard deviation up to {:.1} px", e.sigma_px))
             }
+            Suspicion::TurnsBack => evidence.map(|e| match e.doubled_px {
+                0.0 => format!("by {:.0} degrees too sharply", e.kinks.to_degrees()),
+                px => format!("over {px:.0} px upon itself in both views"),
+            }),
             Suspicion::NotAdjusted => self.not_adjusted.clone(),
         }
     }
@@ -95,6 +102,8 @@ mod tests {
         along_epipolar_line: 0.0,
         last_move_px: 0.1,
         bending: 0.1,
+        kinks: 0.0,
+        doubled_px: 0.0,
     };
 
     fn outline() -> OutlineDiagnostics {

@@ -98,6 +98,8 @@ impl Params {
         RobustParams {
             exchange: self.robust.exchange && drawn,
             turned: self.robust.turned && drawn,
+            kink_weight: if drawn { 0.0 } else { self.robust.kink_weight },
+            doubled_weight: if drawn { 0.1 } else { 1.0 } * self.robust.doubled_weight,
             min_fits: self.robust.min_fits.max(if drawn { 1 } else { IMAGES_MIN_FITS }),
             clear_lead: self.robust.clear_lead.max(if drawn { 0.0 } else { IMAGES_CLEAR_LEAD }),
             ..self.robust

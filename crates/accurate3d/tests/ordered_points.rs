@@ -9,7 +9,9 @@ use accurate3d::fit::CalibrationPriors;
 use accurate3d::geom::{Camera, Pixel, Rig, View};
 use accurate3d::io::OrderedPoints;
 use accurate3d::synth::{CalibrationError, CaseOptions, Family, SynthCase, generate};
-use accurate3d::{Error, InputKind, Method, Params, Reconstruction, ViewPair, reconstruct};
+use accurate3d::{
+    Error, InputKind, Method, Params, Reconstruction, Suspicion, ViewPair, reconstruct,
+};
 use ndarray::Array2;
 use turned_cameras::{mirrored, transposed};
 
@@ -195,4 +197,45 @@ fn any_number_of_threads_gives_the_same_bytes() {
     // `Debug` of a number is the shortest text that reads back as the same bits.
     assert_eq!(one, run(2));
     assert_eq!(one, run(8));
+}
+
+/// A polyline that was clicked by hand has a vertex every dozen pixels; it stands for its chords.
+#[test]
+fn vertices_of_a_polyline_give_the_curve_between_them() {
+    for index in 0..4 {
+        let case = generate(Family::Easy, SEED, index, &CaseOptions::default()).unwrap();
+        let (points1, points2) = case.exact_points.clone();
+        fn every<V: View>(points: &[Pixel<V>], step: usize) -> Vec<Pixel<V>> {
+            let last = points.last().copied();
+            points[..points.len() - 1].iter().step_by(step).copied().chain(last).collect()
+        }
+        let off = |step: usize| {
+            let points = Some((every(&points1, step), every(&points2, step)));
+            let found = accurate(&pair(&case.rig, points, None), InputKind::Points).unwrap();
+            curve_scores(&found.positions(), &case.truth, 0.5).unwrap().hausdorff / per_px(&case)
+        };
+        // The height of a chord over 12 px of the tightest bends of this family is some 0.5 px in the image,
+        // and may lie along an epipolar line.
+        let (fine, coarse) = (off(1), off(12));
+        assert!(fine < 0.1 && coarse < 4.0, "{index}: {fine} {coarse} px");
+    }
+}
+
+/// What is swapped or displaced leaves parts of both curves without partners, which a wire of which one view
+/// sees more does not.
+#[test]
+fn parts_left_out_in_both_views_are_a_reason_for_doubt() {
+    for index in 0..4 {
+        let case = generate(Family::Medium, SEED, index, &CaseOptions::default()).unwrap();
+        let (points1, points2) = case.exact_points.clone();
+        let doubts = |points: OrderedPoints| {
+            let found = accurate(&pair(&case.rig, Some(points), None), InputKind::Points);
+            found.map(|found| found.diagnostics.suspicions)
+        };
+        let (n1, n2) = (points1.len(), points2.len());
+        let sees_more = doubts((points1.clone(), points2[n2 / 5..].to_vec())).unwrap();
+        assert_eq!(sees_more, [], "{index}: one view sees more");
+        let both = doubts((points1[..n1 - n1 / 5].to_vec(), points2[n2 / 5..].to_vec())).unwrap();
+        assert!(both.contains(&Suspicion::Uncovered), "{index}: {both:?}");
+    }
 }

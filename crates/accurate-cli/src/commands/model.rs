@@ -56,9 +56,13 @@ fn info(bundle: &ModelBundle, console: &Console) -> Result<(), Failure> {
         facts.opset
     ))?;
     console.data(&format!("normalisation  {:?}", manifest.normalisation))?;
-    console.data(&format!("tiling         {:?}", manifest.tiling))?;
+    let [height, width] = manifest.tiling.window_px;
+    console.data(&format!(
+        "images         whole up to {} px, else in windows of {width} x {height} px",
+        manifest.tiling.whole_up_to_px
+    ))?;
     console.data(&format!("mirror axes    {:?}", manifest.mirror_axes))?;
-    console.data(&format!("mask           {:?}", manifest.postprocessing))?;
+    console.data(&format!("mask           {}", manifest.postprocessing))?;
     for (key, value) in &manifest.card {
         console.data(&format!("{key:<14} {value}"))?;
     }

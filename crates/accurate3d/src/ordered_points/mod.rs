@@ -1,5 +1,6 @@
 mod adjusted;
 mod closed;
+mod dense;
 mod part;
 mod starts;
 
@@ -9,6 +10,7 @@ use accurate_match::{FreeMatch, FreeMatchParams, FreeMatcher, MatchError, Tangen
 
 use adjusted::Adjusted;
 use closed::closed_points;
+use dense::densified;
 use part::{DOUBTFUL_POINTS, End, MatchedPart};
 use starts::smoothed_pairs;
 
@@ -19,6 +21,8 @@ use crate::{Closure, Error, Params, Reconstruction, ViewPair};
 /// Our own method on ordered points: matched in the better direction with free ends and gaps, then
 /// one 3D spline adjusted to both views. Curves whose ends meet in both views are closed ones.
 ///
+/// Vertices of a polyline that are farther apart than the matcher's steps stand for their chords.
+///
 /// The adjustment refuses a match that is no basis for it; the match is then returned as it is, and
 /// the diagnostics say why.
 pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
@@ -28,6 +32,9 @@ pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Recons
         .points
         .as_ref()
         .ok_or_else(|| Error::MissingInput { case: case(), input: params.input })?;
+    let dense = (densified(points1), densified(points2));
+    let (points1, points2) =
+        (dense.0.as_ref().unwrap_or(points1), dense.1.as_ref().unwrap_or(points2));
     if params.closure == Closure::Closed {
         return closed_points(pair, params, (points1, points2));
     }

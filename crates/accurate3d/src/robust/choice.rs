@@ -169,6 +169,9 @@ pub(crate) fn choose(
         more.append(&mut finalists);
         finalists = search.finalists(more);
     }
+    let (uncut, pieces) = search.cut_at_hairpins(finalists);
+    finalists = uncut;
+    fits += pieces;
     if params.exchange {
         let (exchanged, crosses) = search.exchanged(finalists);
         finalists = exchanged;

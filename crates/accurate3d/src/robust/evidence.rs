@@ -3,7 +3,7 @@ use accurate_geom::{Curve3, Rig, View};
 use accurate_traverse::Walk;
 use serde::{Deserialize, Serialize};
 
-use super::score::{BENDING, Candidate, MISFIT};
+use super::score::{BENDING, Candidate, DOUBLED, KINKS, MISFIT, price_of_turns};
 use super::shape::{Shape, px_per_unit_along};
 
 /// What bears on whether a chosen curve is the right one, all known without the truth.
@@ -43,12 +43,19 @@ pub struct Evidence {
     pub last_move_px: f64,
     /// `∫ min(κ, 0.1 / px) |dθ|` of the curve, 1/px.
     pub bending: f64,
+    /// By how much a curve of images turns where it bends more sharply than a radius of 4 px allows,
+    /// radians; 0 of masks.
+    pub kinks: f64,
+    /// Length along which the curve lies upon itself in both views and runs back, px.
+    pub doubled_px: f64,
 }
 
 impl Evidence {
     /// What a score counts of it that does not depend on how many boundary points there are.
     pub(crate) fn cost(&self) -> f64 {
-        MISFIT * (self.unexplained + self.outside) + BENDING * self.bending
+        MISFIT * (self.unexplained + self.outside)
+            + BENDING * self.bending
+            + price_of_turns([KINKS, DOUBLED], self.kinks, self.doubled_px)
     }
 
     pub(crate) fn new(
@@ -76,6 +83,8 @@ impl Evidence {
             along_epipolar_line: along_epipolar_line(&best.fit.curve, rig),
             last_move_px: before.distance_px(&best.shape),
             bending: super::shape::bending(&best.fit.curve, rig),
+            kinks: best.kinks,
+            doubled_px: best.doubled_px,
         }
     }
 }

@@ -8,6 +8,7 @@ use super::evidence::Evidence;
 use super::frame::Turn;
 use super::grey_levels::{choose_by_grey_levels, on_grey_levels};
 use super::look::{Look, Seen};
+use super::score::{DOUBLED, KINKS};
 use super::suspicion::{DoubtLimits, Suspicion, calls_for_the_pictures};
 use crate::{Closure, Error, Explanation, IntensityDiagnostics};
 
@@ -43,6 +44,13 @@ pub struct RobustParams {
     pub good_distance_px: f64,
     /// Weight of the walks' own cost in the final choice.
     pub walk_weight: f64,
+    /// What a radian costs by which a curve turns more sharply than a wire bends (a radius of 4 px): wires go
+    /// on, and what turns back has gone on along something else. On images only: the masks of some
+    /// generated families show such turns.
+    pub kink_weight: f64,
+    /// What a px costs along which a curve runs back over itself in both views, beyond 12 px. Less on masks,
+    /// where all that is shown is the body: there it is above all a reason for doubt.
+    pub doubled_weight: f64,
     /// Whether a pair from images is judged by the probability maps themselves, and walks are led
     /// over gaps by them; else by the masks alone. On the built-in network's maps more curves are
     /// right, and they are placed better (docs/segmentation.md).
@@ -100,6 +108,8 @@ impl RobustParams {
         good_chi_per_point: 0.062,
         good_distance_px: 1.0,
         walk_weight: 0.3,
+        kink_weight: KINKS,
+        doubled_weight: DOUBLED,
         by_probability: true,
         by_grey_levels: true,
         exchange: true,
@@ -113,6 +123,8 @@ impl RobustParams {
         for (name, value) in [
             ("contenders", self.contenders),
             ("walk_weight", self.walk_weight),
+            ("kink_weight", self.kink_weight),
+            ("doubled_weight", self.doubled_weight),
             ("clear_lead", self.clear_lead),
             ("good_unexplained", self.good_unexplained),
             ("good_chi_per_point", self.good_chi_per_point),

@@ -9,6 +9,7 @@ mod finalists;
 mod fitting;
 mod frame;
 mod grey_levels;
+mod hairpins;
 mod joint;
 mod look;
 mod other_ways;

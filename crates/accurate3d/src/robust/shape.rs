@@ -6,6 +6,10 @@ const COMPARED: usize = 48;
 /// a hairpin must not outweigh the whole outline.
 const SHARP_PER_PX: f64 = 0.1;
 
+/// Radius of the sharpest bend that a wire takes without a kink, px: wires in pictures are some 2 px wide,
+/// and the J tips of the generated ones bend at 4 px.
+const LEAST_RADIUS_PX: f64 = 4.0;
+
 /// What a curve looks like, to tell it from others without its spline.
 #[derive(Debug, Clone)]
 pub(crate) struct Shape {
@@ -86,6 +90,15 @@ pub(crate) fn bending(curve: &Curve3, rig: &Rig) -> f64 {
         }
     }
     sum
+}
+
+/// By how much a curve turns in all where it bends more sharply than the radius of 4 px allows, radians: a
+/// half turn within a pixel or two counts nearly in full.
+pub(crate) fn kinks(curve: &Curve3, rig: &Rig) -> f64 {
+    let points = dense(curve, rig);
+    let chords: Vec<_> = points.windows(2).map(|w| w[1] - w[0]).collect();
+    let allowed = px_per_unit(&points, rig) * chords[0].norm() / LEAST_RADIUS_PX;
+    chords.windows(2).map(|w| (w[0].angle(&w[1]) - allowed).max(0.0)).sum()
 }
 
 /// Points about 1 px apart along a curve.

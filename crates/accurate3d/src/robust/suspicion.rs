@@ -3,7 +3,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::evidence::Evidence;
-use super::score::allowance;
+use super::score::{DOUBLED_PX, KINKED, allowance};
 
 /// A reason to doubt a reconstruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -20,10 +20,13 @@ pub enum Suspicion {
     Ambiguous,
     /// The walks of the two views do not agree epipolarly.
     ViewsDisagree,
-    /// Part of a skeleton is not walked along.
+    /// Part of a skeleton is not walked along, or parts of both ordered curves have no partners.
     Uncovered,
     /// The curve is weakly seen somewhere, as along epipolar lines.
     Uncertain,
+    /// The curve turns back as hardly any body does: over itself in both views, or more sharply than a wire
+    /// bends (images only).
+    TurnsBack,
     /// Ordered points were matched, but the match is no basis for an adjustment.
     NotAdjusted,
 }
@@ -117,6 +120,7 @@ impl Evidence {
             (self.walks_distance_px > DISTANCE_PX, Suspicion::ViewsDisagree),
             (self.uncovered > UNCOVERED, Suspicion::Uncovered),
             (self.sigma_px > allowance.sqrt() * limits.sigma_px, Suspicion::Uncertain),
+            (self.kinks > KINKED || self.doubled_px > DOUBLED_PX, Suspicion::TurnsBack),
         ]
         .into_iter()
         .filter_map(|(holds, reason)| holds.then_some(reason))
@@ -166,7 +170,8 @@ impl fmt::Display for Suspicion {
             Self::Uncertain => "weakly seen",
             Self::Ambiguous => "ambiguous order",
             Self::ViewsDisagree => "views disagree",
-            Self::Uncovered => "skeleton not covered",
+            Self::Uncovered => "part of the body left out",
+            Self::TurnsBack => "turns back",
             Self::NotAdjusted => "match not adjusted",
         })
     }
@@ -197,6 +202,8 @@ mod tests {
         along_epipolar_line: 0.0,
         last_move_px: 0.1,
         bending: 0.1,
+        kinks: 0.0,
+        doubled_px: 0.0,
     };
 
     #[test]
