@@ -38,10 +38,9 @@ impl Diagnostics {
             Suspicion::Uncertain => {
                 evidence.map(|e| format!("standard deviation up to {:.1} px", e.sigma_px))
             }
-            Suspicion::TurnsBack => evidence.map(|e| match e.doubled_px {
-                0.0 => format!("by {:.0} degrees too sharply", e.kinks.to_degrees()),
-                px => format!("over {px:.0} px upon itself in both views"),
-            }),
+            Suspicion::TurnsBack => {
+                evidence.map(|e| format!("over {:.0} px upon itself in both views", e.doubled_px))
+            }
             Suspicion::NotAdjusted => self.not_adjusted.clone(),
         }
     }

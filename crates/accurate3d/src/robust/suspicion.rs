@@ -24,8 +24,7 @@ pub enum Suspicion {
     Uncovered,
     /// The curve is weakly seen somewhere, as along epipolar lines.
     Uncertain,
-    /// The curve turns back as hardly any body does: over itself in both views, or more sharply than a wire
-    /// bends (images only).
+    /// The curve runs back over itself in both views, as hardly any body does.
     TurnsBack,
     /// Ordered points were matched, but the match is no basis for an adjustment.
     NotAdjusted,
@@ -120,7 +119,7 @@ impl Evidence {
             (self.walks_distance_px > DISTANCE_PX, Suspicion::ViewsDisagree),
             (self.uncovered > UNCOVERED, Suspicion::Uncovered),
             (self.sigma_px > allowance.sqrt() * limits.sigma_px, Suspicion::Uncertain),
-            (self.kinks > KINKED || self.doubled_px > DOUBLED_PX, Suspicion::TurnsBack),
+            (self.doubled_px > DOUBLED_PX, Suspicion::TurnsBack),
         ]
         .into_iter()
         .filter_map(|(holds, reason)| holds.then_some(reason))
@@ -132,6 +131,7 @@ impl Evidence {
 /// map leaves unexplained may be explained better.
 pub(crate) fn calls_for_a_second_look(evidence: &Evidence) -> bool {
     has_rival(evidence, MARGIN_TO_LOOK_AGAIN)
+        || evidence.kinks > KINKED
         || !evidence.suspicions(&DoubtLimits::MASKS_TO_LOOK_ON).is_empty()
 }
 
@@ -154,6 +154,7 @@ pub(crate) fn calls_for_a_careful_look(evidence: &Evidence) -> bool {
 
 fn is_worth_asking_on(evidence: &Evidence, counts: fn(&Suspicion) -> bool) -> bool {
     evidence.walks_behind > BEHIND_TO_ASK_ON
+        || evidence.kinks > KINKED
         || evidence.suspicions(&DoubtLimits::MAPS_TO_ASK_ON).iter().any(counts)
 }
 
@@ -249,6 +250,18 @@ mod tests {
         assert!(calls_for_a_second_look(&rival(close)));
         assert!(!calls_for_a_second_look(&rival(MARGIN_TO_LOOK_AGAIN)));
         assert!(calls_for_a_second_look(&Evidence { outside: 0.2, ..GOOD }));
+    }
+
+    #[test]
+    fn what_runs_back_over_itself_is_doubted_and_a_kink_looked_at_harder() {
+        let doubled = Evidence { doubled_px: DOUBLED_PX + 1.0, ..GOOD };
+        for limits in [DoubtLimits::MASKS, DoubtLimits::MAPS] {
+            assert_eq!(doubled.suspicions(&limits), [Suspicion::TurnsBack]);
+        }
+        let kinked = Evidence { kinks: KINKED + 0.1, ..GOOD };
+        assert!(kinked.suspicions(&DoubtLimits::MAPS).is_empty());
+        assert!(calls_for_a_second_look(&kinked) && calls_for_a_careful_look(&kinked));
+        assert!(calls_for_the_pictures(&kinked) && !calls_for_the_pictures(&GOOD));
     }
 
     #[test]
