@@ -4,9 +4,15 @@ use accurate_geom::{Pixel, View};
 /// are no farther apart than 1.42.
 const SPARSE_PX: f64 = 2.0;
 
+/// Fewer points draw no body.
+const FEWEST: usize = 4;
+
 /// Vertices farther apart than the matcher's steps, with points at most 1 px apart put between them along
-/// the chords; `None` if they are near enough.
+/// the chords; `None` if they are near enough, or too few.
 pub(super) fn densified<V: View>(points: &[Pixel<V>]) -> Option<Vec<Pixel<V>>> {
+    if points.len() < FEWEST {
+        return None;
+    }
     let mut lengths: Vec<f64> = points.windows(2).map(|w| w[0].distance(w[1])).collect();
     lengths.sort_unstable_by(f64::total_cmp);
     if lengths.get(lengths.len() / 2).is_none_or(|median| *median <= SPARSE_PX) {
@@ -38,7 +44,7 @@ mod tests {
     proptest! {
         #[test]
         fn vertices_stay_in_order_and_what_is_between_lies_on_the_chords(
-            steps in prop::collection::vec((2.1..40.0_f64, 0.0..6.3_f64), 1..30),
+            steps in prop::collection::vec((2.1..40.0_f64, 0.0..6.3_f64), 3..30),
         ) {
             let mut at = Pixel::<View1>::new(0.0, 0.0);
             let mut vertices = vec![at];
@@ -60,9 +66,10 @@ mod tests {
     }
 
     #[test]
-    fn dense_points_stay_as_they_are() {
+    fn dense_points_and_few_stay_as_they_are() {
         let row: Vec<Pixel<View1>> = (0..20).map(|k| Pixel::new(f64::from(k) * 1.4, 3.0)).collect();
         assert!(densified(&row).is_none());
-        assert!(densified(&row[..1]).is_none());
+        let few: Vec<Pixel<View1>> = (0..3).map(|k| Pixel::new(f64::from(k) * 50.0, 3.0)).collect();
+        assert!(densified(&row[..1]).is_none() && densified(&few).is_none());
     }
 }
