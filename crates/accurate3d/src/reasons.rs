@@ -137,7 +137,7 @@ mod tests {
             "misfit (mean square 0.071 px²)",
             "ambiguous order (the likeliest other one is 1.3 behind)",
             "views disagree (mean epipolar distance 0.52 px)",
-            "skeleton not covered (14 %)",
+            "part of the body left out (14 %)",
             "weakly seen (standard deviation up to 1.4 px)",
         ];
         assert_eq!(found.reasons(), expected);
@@ -185,7 +185,7 @@ mod tests {
         let expected = [
             "misfit (1.8 times the noise)",
             "ambiguous order (another match costs 0.02 px a point more)",
-            "skeleton not covered (10 %)",
+            "part of the body left out (10 %)",
             "match not adjusted (no basis)",
         ];
         assert_eq!(found.reasons(), expected);
