@@ -178,7 +178,8 @@ impl Code {
                 "No monotone pairing of the two curves makes sense under this calibration: usually \
                  the views are swapped, the extrinsics are inverted (camera to world instead of \
                  world to camera), or the pixels are not undistorted. `accurate camera doctor` tries \
-                 these and more, and names the one."
+                 these and more, and names the one. A 3x4 matrix times a negative number, as a DLT \
+                 may give it, puts everything behind its camera: multiply it by -1."
             }
             Self::NoFit => {
                 "A spline was fitted to both views and did not come out as a curve: too few points \
