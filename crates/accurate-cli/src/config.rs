@@ -161,7 +161,7 @@ pub fn schema(command: &Command) -> Value {
     schema
 }
 
-fn config_path(words: &[OsString]) -> Option<PathBuf> {
+pub fn config_path(words: &[OsString]) -> Option<PathBuf> {
     words.iter().enumerate().skip(1).find_map(|(at, word)| {
         let word = word.to_str()?;
         match word.strip_prefix("--config") {

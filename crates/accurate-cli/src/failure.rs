@@ -38,6 +38,19 @@ impl Failure {
         self
     }
 
+    /// Where options of a config file count among those of the command line: a wrong one may stand there.
+    pub fn with_config(self, config: Option<&Path>) -> Self {
+        match config.filter(|_| self.code == Self::USAGE) {
+            None => self,
+            Some(path) => {
+                let there = format!("what {} says counts as if it were typed", path.display());
+                let hint =
+                    self.hint.as_ref().map_or_else(|| there.clone(), |h| format!("{h}; {there}"));
+                self.with_hint(hint)
+            }
+        }
+    }
+
     /// The same exit code and hint behind another message.
     pub fn about(self, message: String) -> Self {
         Self { message, ..self }

@@ -52,6 +52,7 @@ fn run(words: Vec<std::ffi::OsString>, json: bool) -> Result<(), Failure> {
     }
     // What a config file says stands before what the user says, and the last word wins.
     let command = Cli::command().args_override_self(true);
+    let config = config::config_path(&words);
     let words = config::expand(&command, words)?;
     let parsed = command
         .clone()
@@ -59,16 +60,22 @@ fn run(words: Vec<std::ffi::OsString>, json: bool) -> Result<(), Failure> {
         .and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, matches)));
     let (cli, matches) = match parsed {
         Ok(parsed) => parsed,
-        Err(error) if json && is_mistake(&error) => return Err(error.into()),
+        Err(error) if json && is_mistake(&error) => {
+            return Err(Failure::from(error).with_config(config.as_deref()));
+        }
         // The parser's own words show more: the usage, in colours.
         Err(error) if is_mistake(&error) => {
             let _ = error.print();
+            if let Some(path) = &config {
+                to_stderr(&format!("  what {} says counts as if it were typed", path.display()));
+            }
             to_stderr(&format!("  more: accurate explain {}", Failure::USAGE));
             std::process::exit(error.exit_code())
         }
         Err(error) => error.exit(),
     };
     commands::run(&cli, &config::effective(&command, &matches))
+        .map_err(|failure| failure.with_config(config.as_deref()))
 }
 
 /// Whether the command line is wrong, rather than a question for help or the version.

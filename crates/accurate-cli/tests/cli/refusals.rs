@@ -302,6 +302,29 @@ fn what_a_pair_folder_says_itself_is_not_said_again_to_the_doctor() {
 }
 
 #[test]
+fn what_a_config_file_says_wrongly_is_not_blamed_on_the_command_line_alone() {
+    let dir = TempDir::new().unwrap();
+    let file = dir.path().join("lab.toml");
+    for (text, json) in [
+        ("[reconstruct]\nunit = \"cm\"\n", false),
+        ("[reconstruct]\ninput = \"bla\"\n", false),
+        ("[reconstruct]\ninput = \"bla\"\n", true),
+    ] {
+        write(file.clone(), text);
+        let mut command = accurate();
+        command.arg("--config").arg(&file).args(["reconstruct", "-o", "never"]);
+        if json {
+            command.arg("--json");
+        }
+        if !text.contains("input") {
+            command.args(["-i", "points"]);
+        }
+        let (code, said) = failure(command.arg(samples().join("bend")));
+        assert!(code == 2 && said.contains("lab.toml says counts"), "{text}: {code} {said}");
+    }
+}
+
+#[test]
 fn quiet_or_verbose_on_the_command_line_wins_over_either_in_the_config_file() {
     let dir = TempDir::new().unwrap();
     let config = dir.path().join("accurate.toml");
