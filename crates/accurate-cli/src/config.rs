@@ -4,7 +4,7 @@
 //! they cannot drift apart from it.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
@@ -170,6 +170,11 @@ pub fn config_path(words: &[OsString]) -> Option<PathBuf> {
             None => None,
         }
     })
+}
+
+/// Where else a wrong option may stand.
+pub fn counts_too(path: &Path) -> String {
+    format!("what {} says counts as if it were typed", path.display())
 }
 
 /// Whether the words of a command line give an option, by its long or its short name.

@@ -10,6 +10,7 @@ use accurate3d::synth::SynthError;
 use accurate3d::traverse::TraverseError;
 
 use crate::code::Code;
+use crate::config::counts_too;
 use crate::segmentation::code_of;
 
 /// What went wrong, what to do about it, and the exit code that says so to a script.
@@ -38,17 +39,11 @@ impl Failure {
         self
     }
 
-    /// Where options of a config file count among those of the command line: a wrong one may stand there.
+    /// A wrong option may stand in the config file.
     pub fn with_config(self, config: Option<&Path>) -> Self {
-        match config.filter(|_| self.code == Self::USAGE) {
-            None => self,
-            Some(path) => {
-                let there = format!("what {} says counts as if it were typed", path.display());
-                let hint =
-                    self.hint.as_ref().map_or_else(|| there.clone(), |h| format!("{h}; {there}"));
-                self.with_hint(hint)
-            }
-        }
+        let Some(path) = config.filter(|_| self.code == Self::USAGE) else { return self };
+        let hints: Vec<String> = self.hint.clone().into_iter().chain([counts_too(path)]).collect();
+        self.with_hint(hints.join("; "))
     }
 
     /// The same exit code and hint behind another message.

@@ -52,7 +52,7 @@ fn run(words: Vec<std::ffi::OsString>, json: bool) -> Result<(), Failure> {
     }
     // What a config file says stands before what the user says, and the last word wins.
     let command = Cli::command().args_override_self(true);
-    let config = config::config_path(&words);
+    let config_file = config::config_path(&words);
     let words = config::expand(&command, words)?;
     let parsed = command
         .clone()
@@ -61,13 +61,13 @@ fn run(words: Vec<std::ffi::OsString>, json: bool) -> Result<(), Failure> {
     let (cli, matches) = match parsed {
         Ok(parsed) => parsed,
         Err(error) if json && is_mistake(&error) => {
-            return Err(Failure::from(error).with_config(config.as_deref()));
+            return Err(Failure::from(error).with_config(config_file.as_deref()));
         }
         // The parser's own words show more: the usage, in colours.
         Err(error) if is_mistake(&error) => {
             let _ = error.print();
-            if let Some(path) = &config {
-                to_stderr(&format!("  what {} says counts as if it were typed", path.display()));
+            if let Some(path) = &config_file {
+                to_stderr(&format!("  {}", config::counts_too(path)));
             }
             to_stderr(&format!("  more: accurate explain {}", Failure::USAGE));
             std::process::exit(error.exit_code())
@@ -75,7 +75,7 @@ fn run(words: Vec<std::ffi::OsString>, json: bool) -> Result<(), Failure> {
         Err(error) => error.exit(),
     };
     commands::run(&cli, &config::effective(&command, &matches))
-        .map_err(|failure| failure.with_config(config.as_deref()))
+        .map_err(|failure| failure.with_config(config_file.as_deref()))
 }
 
 /// Whether the command line is wrong, rather than a question for help or the version.

@@ -28,10 +28,11 @@ impl Diagnostics {
                 Some(format!("mean epipolar distance {:.2} px", self.mean_epipolar_distance_px))
             }
             Suspicion::Uncovered => {
-                // Of ordered points the larger part that has partners decides.
-                let covered = self.trace_coverage[0]
-                    .min(self.trace_coverage[1])
-                    .min(self.matched_fraction[0].max(self.matched_fraction[1]));
+                // Of given points, which are their own trace, the larger part that has partners decides.
+                let covered = match self.trace_coverage {
+                    [1.0, 1.0] => self.matched_fraction[0].max(self.matched_fraction[1]),
+                    [one, two] => one.min(two),
+                };
                 let uncovered = evidence.map_or(1.0 - covered, |e| e.uncovered);
                 Some(format!("{:.0} %", 100.0 * uncovered))
             }

@@ -91,6 +91,9 @@ impl Params {
 const IMAGES_MIN_FITS: usize = 6;
 const IMAGES_CLEAR_LEAD: f64 = 4.0;
 
+/// On masks all that is shown is the body: of the price of a doubled length so much is left.
+const DRAWN_DOUBLED: f64 = 0.1;
+
 impl Params {
     /// What the joint choice goes by: on what a network found, not everything that masks allow.
     fn in_effect(&self) -> RobustParams {
@@ -99,7 +102,7 @@ impl Params {
             exchange: self.robust.exchange && drawn,
             turned: self.robust.turned && drawn,
             kink_weight: if drawn { 0.0 } else { self.robust.kink_weight },
-            doubled_weight: if drawn { 0.1 } else { 1.0 } * self.robust.doubled_weight,
+            doubled_weight: self.robust.doubled_weight * if drawn { DRAWN_DOUBLED } else { 1.0 },
             min_fits: self.robust.min_fits.max(if drawn { 1 } else { IMAGES_MIN_FITS }),
             clear_lead: self.robust.clear_lead.max(if drawn { 0.0 } else { IMAGES_CLEAR_LEAD }),
             ..self.robust

@@ -3,7 +3,8 @@ use accurate_geom::{Curve3, Rig, View};
 use accurate_traverse::Walk;
 use serde::{Deserialize, Serialize};
 
-use super::score::{BENDING, Candidate, DOUBLED, KINKS, MISFIT, price_of_turns};
+use super::hairpins::{DOUBLED, KINKS, Turns};
+use super::score::{BENDING, Candidate, MISFIT};
 use super::shape::{Shape, px_per_unit_along};
 
 /// What bears on whether a chosen curve is the right one, all known without the truth.
@@ -53,9 +54,10 @@ pub struct Evidence {
 impl Evidence {
     /// What a score counts of it that does not depend on how many boundary points there are.
     pub(crate) fn cost(&self) -> f64 {
+        let turns = Turns { kinks: self.kinks, doubled_px: self.doubled_px };
         MISFIT * (self.unexplained + self.outside)
             + BENDING * self.bending
-            + price_of_turns([KINKS, DOUBLED], self.kinks, self.doubled_px)
+            + turns.price([KINKS, DOUBLED])
     }
 
     pub(crate) fn new(
@@ -83,8 +85,8 @@ impl Evidence {
             along_epipolar_line: along_epipolar_line(&best.fit.curve, rig),
             last_move_px: before.distance_px(&best.shape),
             bending: super::shape::bending(&best.fit.curve, rig),
-            kinks: best.kinks,
-            doubled_px: best.doubled_px,
+            kinks: best.turns.kinks,
+            doubled_px: best.turns.doubled_px,
         }
     }
 }

@@ -1,10 +1,10 @@
 use accurate_geom::nalgebra::Vector2;
-use accurate_geom::{Camera, Curve3, Point3, Rig};
+use accurate_geom::{Camera, Curve3, Point2, Point3, Rig};
 
 use super::fitting::PLAIN;
 use super::score::Candidate;
 use super::search::Search;
-use super::shape::{dense, px_per_unit};
+use super::shape::{dense, image_of, px_per_unit};
 use super::side_by_side::side_by_side;
 use super::start::through;
 
@@ -17,13 +17,58 @@ const LEAST_PART: f64 = 0.25;
 /// Pieces of one curve that are tried, the longest first.
 const MOST_PIECES: usize = 3;
 
+/// Radius of the sharpest bend that a wire takes without a kink, px: wires in pictures are some 2 px wide,
+/// and the J tips of the generated ones bend at 4 px.
+const LEAST_RADIUS_PX: f64 = 4.0;
+/// What a radian of turn costs that is sharper than a wire bends, of images.
+pub(super) const KINKS: f64 = 4.0;
+/// Turns this much sharper than a wire bends call for a harder look, radians; alone they are no reason for
+/// doubt: of pictures of `medium` one in twenty right curves has them.
+pub(super) const KINKED: f64 = 0.7;
+/// What a px costs along which a curve runs back over itself in both views, of images: more than the outline
+/// of something else that a curve without it leaves unexplained.
+pub(super) const DOUBLED: f64 = 1.0;
+/// So many of them cost nothing: of 340 curves of the generated families one is doubled by more.
+pub(super) const DOUBLED_PX: f64 = 12.0;
+
+/// How a curve turns where hardly any body does.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Turns {
+    /// By how much in all where it bends more sharply than the radius of 4 px allows, radians: a half turn
+    /// within a pixel or two counts nearly in full.
+    pub(crate) kinks: f64,
+    /// Length along which it lies upon itself in both views and runs back, px: a body may in one view, but
+    /// hardly in both.
+    pub(crate) doubled_px: f64,
+}
+
+impl Turns {
+    /// Kinks are 0 where they have no price.
+    pub(crate) fn of(curve: &Curve3, rig: &Rig, [kink_weight, _]: [f64; 2]) -> Self {
+        let points = dense(curve, rig);
+        Self {
+            kinks: if kink_weight > 0.0 { kinks(&points, rig) } else { 0.0 },
+            doubled_px: doubled_px(&points, rig),
+        }
+    }
+
+    /// At these prices of a radian and of a px.
+    pub(crate) fn price(self, [kink_weight, doubled_weight]: [f64; 2]) -> f64 {
+        kink_weight * self.kinks + doubled_weight * (self.doubled_px - DOUBLED_PX).max(0.0)
+    }
+
+    pub(crate) fn are_back(self) -> bool {
+        self.kinks > KINKED || self.doubled_px > DOUBLED_PX
+    }
+}
+
 impl Search<'_> {
     /// The finalists with the pieces of those that turn back on themselves among them: where something else
     /// hangs on the body, or crosses it, a curve may run along it, turn round at its end, and come back over
     /// the body. One of the pieces between its turns is the body then. Also how many were fitted.
     pub(crate) fn cut_at_hairpins(&self, mut finalists: Vec<Candidate>) -> (Vec<Candidate>, usize) {
         let cut = |candidate: &Candidate| -> Vec<Candidate> {
-            if !candidate.turns_back() {
+            if !candidate.turns.are_back() {
                 return Vec::new();
             }
             let points = dense(&candidate.fit.curve, self.rig);
@@ -80,9 +125,15 @@ fn hairpins(points: &[Point3]) -> Vec<usize> {
         .collect()
 }
 
-/// Length along which a curve lies upon itself in both views and runs back, px: a body may in one view, but
-/// hardly in both.
-pub(crate) fn doubled_px(curve: &Curve3, rig: &Rig) -> f64 {
+/// [`Turns::kinks`] of points about 1 px apart.
+fn kinks(points: &[Point3], rig: &Rig) -> f64 {
+    let chords: Vec<_> = points.windows(2).map(|w| w[1] - w[0]).collect();
+    let allowed = px_per_unit(points, rig) * chords[0].norm() / LEAST_RADIUS_PX;
+    chords.windows(2).map(|w| (w[0].angle(&w[1]) - allowed).max(0.0)).sum()
+}
+
+/// [`Turns::doubled_px`] of points about 1 px apart; 0 where a camera does not see all of them.
+fn doubled_px(points: &[Point3], rig: &Rig) -> f64 {
     /// Every so many px.
     const STEP: usize = 3;
     const NEAR_PX: f64 = 2.5;
@@ -90,29 +141,27 @@ pub(crate) fn doubled_px(curve: &Curve3, rig: &Rig) -> f64 {
     const BACK: f64 = -0.7;
     /// Nearer along the curve it is the turn itself, px.
     const TURN_PX: usize = 9;
-    let points = dense(curve, rig);
-    if hairpins(&points).is_empty() {
+    if hairpins(points).is_empty() {
         return 0.0;
     }
-    let seen = |camera: &Camera| -> Option<Vec<Vector2<f64>>> {
-        let project = |p: &Point3| camera.project(p).ok().map(|at| Vector2::new(at.x, at.y));
-        points.iter().step_by(STEP).map(project).collect()
+    let sparse: Vec<Point3> = points.iter().step_by(STEP).copied().collect();
+    let directed = |camera: &Camera| -> Option<Vec<(Point2, Vector2<f64>)>> {
+        let image = image_of(camera, &sparse)?;
+        let last = image.len() - 1;
+        let along = |k: usize| image[(k + 1).min(last)] - image[k.saturating_sub(1)];
+        let way = |k: usize| along(k).try_normalize(0.0).unwrap_or_default();
+        Some(image.iter().enumerate().map(|(k, at)| (*at, way(k))).collect())
     };
-    let (Some(view1), Some(view2)) = (seen(rig.camera1()), seen(rig.camera2())) else { return 0.0 };
-    let directions = |view: &[Vector2<f64>]| -> Vec<Vector2<f64>> {
-        let last = view.len() - 1;
-        let along = |k: usize| view[(k + 1).min(last)] - view[k.saturating_sub(1)];
-        (0..view.len()).map(|k| along(k).try_normalize(0.0).unwrap_or_default()).collect()
+    let (Some(view1), Some(view2)) = (directed(rig.camera1()), directed(rig.camera2())) else {
+        return 0.0;
     };
-    let (along1, along2) = (directions(&view1), directions(&view2));
-    let back = |view: &[Vector2<f64>], along: &[Vector2<f64>], i: usize, j: usize| {
-        (view[i] - view[j]).norm_squared() < NEAR_PX * NEAR_PX && along[i].dot(&along[j]) < BACK
+    let runs_back = |view: &[(Point2, Vector2<f64>)], i: usize, j: usize| {
+        let ((a, way_a), (b, way_b)) = (view[i], view[j]);
+        (a - b).norm_squared() < NEAR_PX * NEAR_PX && way_a.dot(&way_b) < BACK
     };
-    let doubled = (0..view1.len()).filter(|&i| {
-        (0..view1.len()).any(|j| {
-            i.abs_diff(j) * STEP > TURN_PX
-                && back(&view1, &along1, i, j)
-                && back(&view2, &along2, i, j)
+    let doubled = (0..sparse.len()).filter(|&i| {
+        (0..sparse.len()).any(|j| {
+            i.abs_diff(j) * STEP > TURN_PX && runs_back(&view1, i, j) && runs_back(&view2, i, j)
         })
     });
     // Both strands were counted.
@@ -123,20 +172,13 @@ pub(crate) fn doubled_px(curve: &Curve3, rig: &Rig) -> f64 {
 mod tests {
     use std::f64::consts::PI;
 
-    use accurate_geom::nalgebra::{Matrix3, Rotation3, Vector3};
-    use accurate_geom::{ImageSize, LengthUnit};
+    use accurate_geom::nalgebra::Vector3;
 
-    use super::super::shape::kinks;
+    use super::super::shape::tests::rig;
     use super::*;
 
-    /// One px a unit at the world's middle, 70 degrees between the views.
-    fn rig() -> Rig {
-        let k = Matrix3::new(1000.0, 0.0, 256.0, 0.0, 1000.0, 256.0, 0.0, 0.0, 1.0);
-        let size = ImageSize { width: 512, height: 512 };
-        let t = Vector3::new(0.0, 0.0, 1000.0);
-        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), 70_f64.to_radians());
-        let camera = |r: Matrix3<f64>| Camera::new(k, r, t, size).unwrap();
-        Rig::new(camera(Matrix3::identity()), camera(*turn.matrix()), LengthUnit::Unit).unwrap()
+    fn turns(points: &[Point3]) -> Turns {
+        Turns::of(&Curve3::interpolate(points).unwrap(), &rig(), [1.0; 2])
     }
 
     /// Down by 100, back up by `back`, `apart` beside it in the direction `aside`.
@@ -183,8 +225,7 @@ mod tests {
 
     #[test]
     fn doubled_is_what_runs_back_over_itself_in_both_views() {
-        let rig = rig();
-        let doubled = |points: &[Point3]| doubled_px(&Curve3::interpolate(points).unwrap(), &rig);
+        let doubled = |points: &[Point3]| turns(points).doubled_px;
         // Samples are 3 px apart, and those next to the turn are the turn's.
         let found = doubled(&hairpin(60.0, 1.0, Vector3::x()));
         assert!((found - 60.0).abs() < 9.0, "{found}");
@@ -197,8 +238,7 @@ mod tests {
 
     #[test]
     fn kinks_are_turns_beyond_the_sharpest_bend() {
-        let rig = rig();
-        let of = |points: &[Point3]| kinks(&Curve3::interpolate(points).unwrap(), &rig);
+        let of = |points: &[Point3]| turns(points).kinks;
         // A quarter of a radian a px is allowed: half a turn over a px or two counts nearly in full.
         let found = of(&hairpin(60.0, 1.0, Vector3::x()));
         assert!(found > 0.6 * PI && found < PI, "{found}");

@@ -7,8 +7,8 @@ use ndarray::Array2;
 use super::evidence::Evidence;
 use super::frame::Turn;
 use super::grey_levels::{choose_by_grey_levels, on_grey_levels};
+use super::hairpins::{DOUBLED, KINKS};
 use super::look::{Look, Seen};
-use super::score::{DOUBLED, KINKS};
 use super::suspicion::{DoubtLimits, Suspicion, calls_for_the_pictures};
 use crate::{Closure, Error, Explanation, IntensityDiagnostics};
 

@@ -1,5 +1,5 @@
 use accurate_fit::OutlineFitParams;
-use accurate_geom::{Camera, Curve3, Pixel, Point2, Point3, Polyline, Rig, View};
+use accurate_geom::{Camera, Curve3, Pixel, Point3, Polyline, Rig, View};
 use accurate_match::FreeEnds;
 
 use super::finalists::SAME_PX;
@@ -7,7 +7,7 @@ use super::fitting::{PLAIN, SETTLED};
 use super::other_ways::{OtherWay, other_ways};
 use super::score::Candidate;
 use super::search::{Effort, Search};
-use super::shape::{Shape, dense, px_per_unit};
+use super::shape::{Shape, dense, image_of, px_per_unit};
 use super::side_by_side::side_by_side;
 use super::start::{PRICES, start_from, through};
 
@@ -124,8 +124,7 @@ impl Shown {
 }
 
 fn seen(camera: &Camera, points: &[Point3]) -> Option<Polyline<2>> {
-    let path: Option<Vec<Point2>> = points.iter().map(|p| camera.project(p).ok()).collect();
-    Polyline::new(path?).ok()
+    Polyline::new(image_of(camera, points)?).ok()
 }
 
 fn pixels<V: View>(path: &Polyline<2>) -> Vec<Pixel<V>> {

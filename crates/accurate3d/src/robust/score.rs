@@ -3,8 +3,8 @@ use accurate_geom::Rig;
 
 use super::RobustParams;
 use super::fitting::SETTLED;
-use super::hairpins::doubled_px;
-use super::shape::{Shape, bending, kinks};
+use super::hairpins::Turns;
+use super::shape::{Shape, bending};
 use crate::ConsideredCurve;
 
 /// A stretch of outline that lies wholly this near to the end of a bridge is a cut face, px.
@@ -25,22 +25,6 @@ const SURPRISE_PER_SCORE: f64 = 12.0;
 /// What a boundary point costs that the curve does not use, px²: what it would cost at the truth, so
 /// that losing points is no gain.
 const UNUSED_PX2: f64 = 1.0 / 18.0;
-
-/// What a radian of turn costs that is sharper than a wire bends, of images.
-pub(super) const KINKS: f64 = 4.0;
-/// Turns this much sharper than a wire bends call for a harder look, radians; alone they are no reason for
-/// doubt: of pictures of `medium` one in twenty right curves has them.
-pub(super) const KINKED: f64 = 0.7;
-/// What a px costs along which a curve runs back over itself in both views, of images: more than the outline
-/// of something else that a curve without it leaves unexplained.
-pub(super) const DOUBLED: f64 = 1.0;
-/// So many of them cost nothing: of 340 curves of the generated families one is doubled by more.
-pub(super) const DOUBLED_PX: f64 = 12.0;
-
-/// What turns cost that hardly any body takes.
-pub(super) fn price_of_turns(weights: [f64; 2], kinks: f64, doubled_px: f64) -> f64 {
-    weights[0] * kinks + weights[1] * (doubled_px - DOUBLED_PX).max(0.0)
-}
 
 /// Boundary points of both views up to which a limit of what is unexplained holds as it is.
 const USUAL_POINTS: f64 = 3000.0;
@@ -103,11 +87,8 @@ pub(crate) struct Candidate {
     pub(crate) misfit: f64,
     /// Less is better.
     pub(crate) score: f64,
-    /// Turns more sharply than a wire bends, radians; 0 where they have no price.
-    pub(crate) kinks: f64,
-    /// Length along which it lies upon itself in both views and runs back, px.
-    pub(crate) doubled_px: f64,
-    /// Prices of such a radian and px.
+    /// How it turns where hardly any body does, and the prices of that.
+    pub(crate) turns: Turns,
     turn_weights: [f64; 2],
     /// What does not depend on the fit.
     pub(crate) prior: f64,
@@ -143,8 +124,7 @@ impl Candidate {
             mended: false,
             misfit: 0.0,
             score: 0.0,
-            kinks: 0.0,
-            doubled_px: 0.0,
+            turns: Turns { kinks: 0.0, doubled_px: 0.0 },
             turn_weights: [params.kink_weight, params.doubled_weight],
             prior,
             mean_distance_px: origin.mean_distance_px,
@@ -197,19 +177,14 @@ impl Candidate {
     fn judge(&mut self, rig: &Rig) {
         let judgement = &self.fit.judgement;
         self.misfit = unexplained(&self.fit, &self.cuts) + judgement.outside;
-        self.kinks = if self.turn_weights[0] > 0.0 { kinks(&self.fit.curve, rig) } else { 0.0 };
-        self.doubled_px = doubled_px(&self.fit.curve, rig);
+        self.turns = Turns::of(&self.fit.curve, rig, self.turn_weights);
         let total = |count: [usize; 2]| (count[0] + count[1]) as f64;
         let unused = (total(judgement.points) - total(judgement.used)).max(0.0);
         self.score = MISFIT * self.misfit
             + 0.5 * (judgement.chi + UNUSED_PX2 * unused)
             + BENDING * bending(&self.fit.curve, rig)
-            + self.turns()
+            + self.turns.price(self.turn_weights)
             + self.prior;
-    }
-
-    fn turns(&self) -> f64 {
-        price_of_turns(self.turn_weights, self.kinks, self.doubled_px)
     }
 
     /// How much less likely than others it is, on the scale of a score: by [`OutlineFit::surprise`]
@@ -217,13 +192,8 @@ impl Candidate {
     pub(crate) fn unlikeliness(&self) -> f64 {
         self.fit.surprise.map_or(f64::INFINITY, |surprise| surprise / SURPRISE_PER_SCORE)
             + MISFIT * self.misfit
-            + self.turns()
+            + self.turns.price(self.turn_weights)
             + self.prior
-    }
-
-    /// Whether it turns as hardly any body does.
-    pub(crate) fn turns_back(&self) -> bool {
-        self.kinks > KINKED || self.doubled_px > DOUBLED_PX
     }
 
     /// Whether nothing speaks against it.
@@ -231,7 +201,7 @@ impl Candidate {
         let judgement = &self.fit.judgement;
         self.misfit < allowance(judgement.boundary_points()) * params.good_unexplained
             && judgement.chi_per_point() < params.good_chi_per_point
-            && !self.turns_back()
+            && !self.turns.are_back()
             && self.mean_distance_px < params.good_distance_px
     }
 }

@@ -1,14 +1,10 @@
-use accurate_geom::{Camera, Curve3, Point3, Rig};
+use accurate_geom::{Camera, Curve3, Point2, Point3, Rig};
 
 /// Samples by which two curves are compared.
 const COMPARED: usize = 48;
 /// Curvature beyond which bending grows only in proportion to the turn, 1/px: a cusp in the image of
 /// a hairpin must not outweigh the whole outline.
 const SHARP_PER_PX: f64 = 0.1;
-
-/// Radius of the sharpest bend that a wire takes without a kink, px: wires in pictures are some 2 px wide,
-/// and the J tips of the generated ones bend at 4 px.
-const LEAST_RADIUS_PX: f64 = 4.0;
 
 /// What a curve looks like, to tell it from others without its spline.
 #[derive(Debug, Clone)]
@@ -92,20 +88,16 @@ pub(crate) fn bending(curve: &Curve3, rig: &Rig) -> f64 {
     sum
 }
 
-/// By how much a curve turns in all where it bends more sharply than the radius of 4 px allows, radians: a
-/// half turn within a pixel or two counts nearly in full.
-pub(crate) fn kinks(curve: &Curve3, rig: &Rig) -> f64 {
-    let points = dense(curve, rig);
-    let chords: Vec<_> = points.windows(2).map(|w| w[1] - w[0]).collect();
-    let allowed = px_per_unit(&points, rig) * chords[0].norm() / LEAST_RADIUS_PX;
-    chords.windows(2).map(|w| (w[0].angle(&w[1]) - allowed).max(0.0)).sum()
-}
-
 /// Points about 1 px apart along a curve.
 pub(crate) fn dense(curve: &Curve3, rig: &Rig) -> Vec<Point3> {
     let evenly = Evenly::of(curve);
     let length_px = evenly.length() * px_per_unit(&evenly.points(16), rig);
     evenly.points(length_px.ceil().clamp(8.0, 65_536.0) as usize + 1)
+}
+
+/// Where a camera shows points; `None` if it does not see all of them.
+pub(crate) fn image_of(camera: &Camera, points: &[Point3]) -> Option<Vec<Point2>> {
+    points.iter().map(|p| camera.project(p).ok()).collect()
 }
 
 /// Points at nearly equal arc lengths, for comparisons: exact ones, whose integrals are found to
@@ -182,13 +174,14 @@ pub(crate) fn arc_lengths_px(points: &[Point3], px_per_unit: f64) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use accurate_geom::{
         ImageSize, LengthUnit, nalgebra::Matrix3, nalgebra::Rotation3, nalgebra::Vector3,
     };
 
-    fn rig() -> Rig {
+    /// One px a unit at the world's middle, 69 degrees between the views.
+    pub(in crate::robust) fn rig() -> Rig {
         let k = Matrix3::new(1000.0, 0.0, 256.0, 0.0, 1000.0, 256.0, 0.0, 0.0, 1.0);
         let size = ImageSize { width: 512, height: 512 };
         let t = Vector3::new(0.0, 0.0, 1000.0);

@@ -3,7 +3,8 @@ use std::fmt;
 use serde::Serialize;
 
 use super::evidence::Evidence;
-use super::score::{DOUBLED_PX, KINKED, allowance};
+use super::hairpins::{DOUBLED_PX, KINKED};
+use super::score::allowance;
 
 /// A reason to doubt a reconstruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]

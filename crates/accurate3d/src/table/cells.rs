@@ -99,6 +99,11 @@ pub fn write_cells(cells: &[Cell]) -> Result<String, String> {
     for cell in cells {
         writer.serialize(cell).map_err(|error| error.to_string())?;
     }
+    text_of(writer)
+}
+
+/// What was written.
+pub(super) fn text_of(writer: csv::Writer<Vec<u8>>) -> Result<String, String> {
     let bytes = writer.into_inner().map_err(|error| error.to_string())?;
     String::from_utf8(bytes).map_err(|error| error.to_string())
 }

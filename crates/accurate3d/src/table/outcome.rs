@@ -1,5 +1,6 @@
 use accurate_eval::{CurveScores, TableScores};
 
+use super::cells::text_of;
 use super::measure::Table;
 use super::rows::Row;
 use crate::Suspicion;
@@ -77,8 +78,7 @@ pub fn cases_csv(table: &Table) -> Result<String, String> {
             writer.write_record(record(table, &row.row, outcome)).map_err(|e| e.to_string())?;
         }
     }
-    let bytes = writer.into_inner().map_err(|e| e.to_string())?;
-    String::from_utf8(bytes).map_err(|e| e.to_string())
+    text_of(writer)
 }
 
 const HEADINGS: [&str; 18] = [
