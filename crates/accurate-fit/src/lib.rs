@@ -47,7 +47,10 @@ pub use calibration::{
 };
 pub use covariance::CurveCovariance;
 pub use error::FitError;
-pub use intensity::{IntensityFit, IntensityFitParams, IntensityPair, fit_intensities};
+pub use intensity::{
+    CurveEnd, CurveEnds, IntensityFit, IntensityFitParams, IntensityPair, ShownPiece,
+    fit_intensities,
+};
 pub use judgement::{Judgement, UnexplainedStretch};
 pub use outline::{BoundaryPoint, Outline};
 pub use outline_params::OutlineFitParams;

@@ -4,7 +4,8 @@
 mod support;
 
 use accurate_fit::{
-    CalibrationPriors, FitError, IntensityFitParams, IntensityPair, fit_intensities,
+    CalibrationPriors, CurveEnd, FitError, IntensityFitParams, IntensityPair, ShownPiece,
+    fit_intensities,
 };
 use accurate_geom::{Camera, Curve3, Rig};
 use accurate_synth::{
@@ -166,4 +167,75 @@ fn what_shows_no_body_is_refused() {
         let refused = fit_intensities(&curve, &images, &case.rig, &params, None).map(|_| ());
         assert!(matches!(refused, Err(FitError::BadParameter { .. })), "{refused:?}");
     }
+}
+
+fn mean_shown(pieces: &[ShownPiece], view: usize) -> f64 {
+    pieces.iter().map(|piece| piece.shown[view]).sum::<f64>() / pieces.len() as f64
+}
+
+#[test]
+fn an_end_is_shown_where_its_darkness_is_there_and_no_further() {
+    const BEYOND_PX: f64 = 20.0;
+    let case = generate(Family::Carm, SEED, 1, &CaseOptions::default()).unwrap();
+    let clear = XrayOptions { dose_photons_per_px: 1e5, background: 0.0, ..XrayOptions::default() };
+    let images = render_xray(&case, &clear).map(|image| image.mapv(f32::from));
+    let params = IntensityFitParams { extension_px: 0.0, ..IntensityFitParams::DEFAULT };
+    let of = |curve: &Curve3, end: CurveEnd, cut_px: f64| {
+        let pair = IntensityPair::around(&[curve], &images, &case.rig, &params, None).unwrap();
+        let ends = pair.ends(curve).unwrap();
+        let pieces = ends.beyond(end, cut_px);
+        let length: f64 = pieces.iter().map(|piece| piece.length_px).sum();
+        assert!((length - cut_px).abs() < 1.0, "{length} {cut_px}");
+        pieces
+    };
+    // The body itself, from either end.
+    let whole = curve_through(&case.truth);
+    for end in [CurveEnd::Begin, CurveEnd::End] {
+        let pieces = of(&whole, end, 30.0);
+        for view in 0..2 {
+            let shown = mean_shown(&pieces, view);
+            assert!(shown > 0.8, "{end:?} {view} {shown}");
+        }
+    }
+    // On beyond the tip, within the plane of the first camera's line of sight: nothing is there in either.
+    let last = case.truth[case.truth.len() - 1];
+    let ahead = (last - case.truth[case.truth.len() - 40]).normalize() / px_per_unit(&case);
+    let longer: Vec<_> = case
+        .truth
+        .iter()
+        .copied()
+        .chain((1..=(2.0 * BEYOND_PX) as usize).map(|k| last + ahead * (0.5 * k as f64)))
+        .collect();
+    let pieces = of(&curve_through(&longer), CurveEnd::End, BEYOND_PX - 2.0);
+    for view in 0..2 {
+        let shown = mean_shown(&pieces, view);
+        assert!(shown < -0.5, "{view} {shown}");
+    }
+    // Back over the body it lies upon it, and the picture has no second darkness for it.
+    let step_px = (case.truth[1] - case.truth[0]).norm() * px_per_unit(&case);
+    let back = case.truth.iter().rev().skip(1).take((25.0 / step_px) as usize);
+    let folded: Vec<_> = case.truth.iter().chain(back).copied().collect();
+    let pieces = of(&curve_through(&folded), CurveEnd::End, 20.0);
+    let upon = pieces.iter().filter(|piece| piece.upon == [true, true]).count();
+    assert!(upon + 2 >= pieces.len(), "{upon} of {}", pieces.len());
+    assert!(mean_shown(&pieces, 0).max(mean_shown(&pieces, 1)) < -0.5, "{pieces:?}");
+}
+
+#[test]
+fn no_end_is_all_of_a_curve_or_nothing() {
+    let case = generate(Family::Carm, SEED, 1, &CaseOptions::default()).unwrap();
+    let images = pictures(&case, XrayResponse::Linear);
+    let curve = curve_through(&case.truth);
+    let params = IntensityFitParams::DEFAULT;
+    let pair = IntensityPair::around(&[&curve], &images, &case.rig, &params, None).unwrap();
+    let ends = pair.ends(&curve).unwrap();
+    for cut_px in [0.0, -5.0, f64::NAN, ends.length_px(), f64::INFINITY] {
+        assert_eq!(ends.beyond(CurveEnd::Begin, cut_px), [], "{cut_px}");
+        assert_eq!(ends.beyond(CurveEnd::End, cut_px), [], "{cut_px}");
+    }
+    // From both ends the same curve: what one calls its first half the other calls the rest.
+    let half = 0.5 * ends.length_px();
+    let [first, last] = [CurveEnd::Begin, CurveEnd::End].map(|end| ends.beyond(end, half));
+    let total: f64 = first.iter().chain(&last).map(|piece| piece.length_px).sum();
+    assert!((total - ends.length_px()).abs() < 2.0, "{total}");
 }

@@ -163,6 +163,11 @@ pub struct IntensityDiagnostics {
     /// By how much the pictures speak for this curve and against the one that the maps had made the
     /// likeliest, as a score; none if they agree.
     pub overruled_by: Option<f64>,
+    /// By how much more of the end that is shown least, px, the curve goes on than pictures and segmentation
+    /// show; none where the body is no thin one.
+    pub lacking_px: Option<f64>,
+    /// What was cut off at the begin and the end of the curve for that, px.
+    pub cut_px: [f64; 2],
     /// Farthest that the curve was moved in either image, its ends aside, px.
     pub moved_px: Option<f64>,
     /// Darkest that the body is drawn in each view, in standard deviations of the noise around it.

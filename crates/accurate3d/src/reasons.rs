@@ -42,6 +42,14 @@ impl Diagnostics {
             Suspicion::TurnsBack => {
                 evidence.map(|e| format!("over {:.0} px upon itself in both views", e.doubled_px))
             }
+            Suspicion::EndNotShown => self.grey_levels.as_ref().and_then(|found| {
+                let [begin, end] = found.cut_px;
+                let cut_px = begin + end;
+                if cut_px > 0.0 {
+                    return Some(format!("{cut_px:.0} px were cut off"));
+                }
+                found.lacking_px.map(|px| format!("{px:.0} px are lacking in pictures and maps"))
+            }),
             Suspicion::NotAdjusted => self.not_adjusted.clone(),
         }
     }

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use accurate_geom::nalgebra::{Matrix2x3, Vector2, Vector3};
 
 use super::band::Band;
@@ -48,12 +50,11 @@ impl Drawing {
             depth: vec![0.0; pixels],
             rows: vec![Row::default(); if derivatives { pixels } else { 0 }],
         };
-        let spans = spline.spans() as f64;
-        let du = spans / samples as f64;
         let radius_px = radius_px(blur_px);
         let cap = |outwards| Piece::Cap { radius_px, outwards };
-        let pieces = (0..samples).map(|k| ((k as f64 + 0.5) * du, Piece::Stretch { du }));
-        let pieces = std::iter::once((0.0, cap(-1.0))).chain(pieces).chain([(spans, cap(1.0))]);
+        let pieces = (0..samples).map(|k| stretch(spline, samples, k));
+        let pieces = std::iter::once((0.0, cap(-1.0))).chain(pieces);
+        let pieces = pieces.chain([(spline.spans() as f64, cap(1.0))]);
         let mut brush = Brush { blur_px, across: Vec::new() };
         for (u, piece) in pieces {
             if let Some(blot) = Blot::new(spline, u, piece, projector) {
@@ -62,6 +63,31 @@ impl Drawing {
         }
         drawing
     }
+}
+
+/// Visits what some of the pieces of a drawing put into the band, the caps aside: the number of the piece,
+/// of the pixel, and the optical depth there for an amplitude of one.
+pub(crate) fn each_darkness(
+    spline: &UniformSpline,
+    samples: usize,
+    pieces: Range<usize>,
+    (projector, blur_px): (&Projector, f64),
+    band: &Band,
+    mut visit: impl FnMut(usize, usize, f64),
+) {
+    let mut brush = Brush { blur_px, across: Vec::new() };
+    for k in pieces {
+        let (u, piece) = stretch(spline, samples, k);
+        if let Some(blot) = Blot::new(spline, u, piece, projector) {
+            brush.each_pixel(&blot, band, |n, _, density| visit(k, n, blot.weight * density));
+        }
+    }
+}
+
+/// A piece of a curve that is drawn with so many, and where it lies.
+fn stretch(spline: &UniformSpline, samples: usize, piece: usize) -> (f64, Piece) {
+    let du = spline.spans() as f64 / samples as f64;
+    ((piece as f64 + 0.5) * du, Piece::Stretch { du })
 }
 
 /// Radius of a solid round body whose blurred cross-section looks like a blot of this size.
@@ -141,41 +167,57 @@ struct Brush {
 
 impl Brush {
     fn add(&mut self, blot: &Blot, projector: &Projector, band: &Band, drawing: &mut Drawing) {
+        let (blur_px, variance) = (self.blur_px, self.blur_px * self.blur_px);
+        let Blot { image, jacobian, tangent, weight, .. } = blot;
+        let roll = projector.roll_derivative(image);
+        self.each_pixel(blot, band, |n, [dx, dy], density| {
+            let darkness = weight * density;
+            drawing.depth[n] += darkness;
+            let Some(row) = drawing.rows.get_mut(n) else { return };
+            // Of the blot's place, px.
+            let (gx, gy) = (darkness * dx / variance, darkness * dy / variance);
+            row.nuisance[0] += gx;
+            row.nuisance[1] += gy;
+            row.nuisance[2] += gx * roll.x + gy * roll.y;
+            row.blur += darkness * ((dx * dx + dy * dy) / variance - 2.0) / blur_px;
+            if row.spans.last().is_none_or(|last| last.0 != blot.span) {
+                row.spans.push((blot.span, [0.0; 12]));
+            }
+            let Some((_, sums)) = row.spans.last_mut() else { return };
+            let moved = jacobian.transpose() * Vector2::new(gx, gy);
+            let turned = (moved - tangent * tangent.dot(&moved)) * blot.swing
+                + tangent * (density * blot.stretch);
+            for j in 0..4 {
+                for d in 0..3 {
+                    sums[3 * j + d] += moved[d] * blot.basis[j] + turned[d] * blot.basis_1[j];
+                }
+            }
+        });
+    }
+
+    /// Visits the pixels of the band that a blot reaches: their numbers, how far each is from its middle, px,
+    /// and the blot's density there, 1/px².
+    #[inline]
+    fn each_pixel(
+        &mut self,
+        blot: &Blot,
+        band: &Band,
+        mut visit: impl FnMut(usize, [f64; 2], f64),
+    ) {
         let variance = self.blur_px * self.blur_px;
         let reach = (REACH_SIGMAS * self.blur_px).ceil() as i64;
         let profile = |offset: f64| (-0.5 * offset * offset / variance).exp();
-        let Blot { image, jacobian, tangent, weight, .. } = blot;
+        let image = &blot.image;
         let (x0, y0) = (image.x.round() as i64, image.y.round() as i64);
         let columns = x0 - reach..=x0 + reach;
         self.across.clear();
         self.across.extend(columns.clone().map(|x| x as f64 - image.x).map(|d| (d, profile(d))));
-        let roll = projector.roll_derivative(image);
         for y in y0 - reach..=y0 + reach {
             let dy = y as f64 - image.y;
             let row_profile = profile(dy) / (2.0 * std::f64::consts::PI * variance);
             for (&(dx, column_profile), x) in self.across.iter().zip(columns.clone()) {
-                let Some(n) = band.number(x, y) else { continue };
-                let density = row_profile * column_profile;
-                let darkness = weight * density;
-                drawing.depth[n] += darkness;
-                let Some(row) = drawing.rows.get_mut(n) else { continue };
-                // Of the blot's place, px.
-                let (gx, gy) = (darkness * dx / variance, darkness * dy / variance);
-                row.nuisance[0] += gx;
-                row.nuisance[1] += gy;
-                row.nuisance[2] += gx * roll.x + gy * roll.y;
-                row.blur += darkness * ((dx * dx + dy * dy) / variance - 2.0) / self.blur_px;
-                if row.spans.last().is_none_or(|last| last.0 != blot.span) {
-                    row.spans.push((blot.span, [0.0; 12]));
-                }
-                let Some((_, sums)) = row.spans.last_mut() else { continue };
-                let moved = jacobian.transpose() * Vector2::new(gx, gy);
-                let turned = (moved - tangent * tangent.dot(&moved)) * blot.swing
-                    + tangent * (density * blot.stretch);
-                for j in 0..4 {
-                    for d in 0..3 {
-                        sums[3 * j + d] += moved[d] * blot.basis[j] + turned[d] * blot.basis_1[j];
-                    }
+                if let Some(n) = band.number(x, y) {
+                    visit(n, [dx, dy], row_profile * column_profile);
                 }
             }
         }

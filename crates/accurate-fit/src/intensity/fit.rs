@@ -18,7 +18,7 @@ const GLOBALS: usize = 7;
 /// The dense equations of more knots take seconds a step.
 const MOST_SPANS: usize = 600;
 /// Blur of a thin body in a sharp picture, px, and how far it may be from that.
-const BLUR_PX: f64 = 1.2;
+pub(super) const BLUR_PX: f64 = 1.2;
 const BLUR_SIGMA_PX: f64 = 0.3;
 const BLUR_RANGE_PX: (f64, f64) = (0.7, 2.5);
 /// How far back along the curve its end's direction is taken from, px.
@@ -91,11 +91,11 @@ pub fn fit_intensities(
 /// can be compared.
 #[derive(Debug)]
 pub struct IntensityPair {
-    params: IntensityFitParams,
+    pub(super) params: IntensityFitParams,
     priors: Option<CalibrationPriors>,
     nuisance: Nuisance,
-    projectors: [Projector; 2],
-    bands: [Band; 2],
+    pub(super) projectors: [Projector; 2],
+    pub(super) bands: [Band; 2],
 }
 
 impl IntensityPair {
@@ -147,7 +147,7 @@ impl IntensityPair {
     /// # Errors
     /// As [`fit_intensities`].
     pub fn fit(&self, start: &Curve3) -> Result<IntensityFit, FitError> {
-        let Start { given, spline, samples, scale } =
+        let Start { given, spline, samples, scale, .. } =
             Start::new(start, &self.projectors, &self.params)?;
         let problem = Problem {
             bands: &self.bands,
@@ -174,19 +174,22 @@ impl IntensityPair {
 }
 
 /// Where a fit starts.
-struct Start {
+#[derive(Debug)]
+pub(super) struct Start {
     /// The curve as it was given.
     given: Vec<Point3>,
     /// The curve, continued at its ends.
-    spline: UniformSpline,
+    pub(super) spline: UniformSpline,
+    /// Its length, px.
+    pub(super) length_px: f64,
     /// Pieces that it is drawn with.
-    samples: usize,
+    pub(super) samples: usize,
     /// Pixels per world unit.
     scale: f64,
 }
 
 impl Start {
-    fn new(
+    pub(super) fn new(
         curve: &Curve3,
         projectors: &[Projector; 2],
         params: &IntensityFitParams,
@@ -204,7 +207,7 @@ impl Start {
         let given = dense_points(curve, POINTS_PER_SPAN * spans);
         let spline = UniformSpline::through(&longer(&given), spans)?;
         let samples = (length_px * SAMPLES_PER_PX).ceil() as usize;
-        Ok(Self { given, spline, samples, scale })
+        Ok(Self { given, spline, length_px, samples, scale })
     }
 }
 
@@ -256,13 +259,7 @@ impl Problem<'_> {
     /// The amplitude that explains the picture best as the curve lies; `None` if that is no darkness.
     fn first_amplitude(&self, state: &State, view: usize) -> Option<f64> {
         let (band, drawing) = (&self.bands[view], self.drawing(state, view, false));
-        let (mut along, mut square) = (0.0, 0.0);
-        for (drawn, seen) in drawing.depth.iter().zip(&band.depth) {
-            along += drawn * seen * band.noise;
-            square += drawn * drawn;
-        }
-        let amplitude = along / square;
-        (amplitude > 0.0 && amplitude.is_finite()).then_some(amplitude)
+        amplitude(&drawing.depth, &band.depth).map(|amplitude| amplitude * band.noise)
     }
 
     fn residuals(&self, state: &State, view: usize, drawing: &Drawing) -> Vec<f64> {
@@ -410,6 +407,14 @@ impl Problem<'_> {
             converged,
         })
     }
+}
+
+/// The multiple of what is drawn that explains best what is seen; `None` if that is no darkness.
+pub(super) fn amplitude(drawn: &[f64], seen: &[f64]) -> Option<f64> {
+    let along: f64 = drawn.iter().zip(seen).map(|(drawn, seen)| drawn * seen).sum();
+    let square: f64 = drawn.iter().map(|drawn| drawn * drawn).sum();
+    let amplitude = along / square;
+    (amplitude > 0.0 && amplitude.is_finite()).then_some(amplitude)
 }
 
 /// The curve's image, by points less than a pixel apart.

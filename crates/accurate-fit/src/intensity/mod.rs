@@ -6,7 +6,9 @@ mod dense_normal;
 mod drawing;
 mod fit;
 mod params;
+mod shown;
 mod smooth;
 
 pub use fit::{IntensityFit, IntensityPair, fit_intensities};
 pub use params::IntensityFitParams;
+pub use shown::{CurveEnd, CurveEnds, ShownPiece};

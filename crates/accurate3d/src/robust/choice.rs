@@ -12,6 +12,10 @@ use crate::Error;
 /// Curves nowhere farther apart than this do not compete, px.
 pub(crate) const RIVAL_PX: f64 = 5.0;
 
+/// More boundary points of both views than any harder look is made for: three times those of the longest
+/// wires of the generated sets.
+const MOST_POINTS_TO_LOOK_ON: usize = 30_000;
+
 /// A choice with the last, adaptive fits.
 pub(crate) struct Settled {
     pub(crate) choice: Choice,
@@ -65,9 +69,11 @@ impl Settled {
         self.prefer(if is_likeliest { at } else { 0 }, given_rig, view1, view2);
     }
 
-    /// Whether most of what the views show is not this body: no other walk through it explains it.
+    /// Whether no harder look helps: most of what the views show is not this body, and no other walk through
+    /// it explains it; or the body is so long that a harder look takes minutes.
     pub(crate) fn is_hopeless(&self) -> bool {
-        self.fits[0].fit.judgement.unexplained_share() > 0.3
+        let judgement = &self.fits[0].fit.judgement;
+        judgement.unexplained_share() > 0.3 || judgement.boundary_points() > MOST_POINTS_TO_LOOK_ON
     }
 
     /// Takes one of the contenders. One that had no last fit is taken under the calibration of the one

@@ -2,7 +2,7 @@ use accurate_fit::{
     CalibrationEstimate, CalibrationPriors, FitError, IntensityFit, IntensityFitParams,
     IntensityPair, fit_intensities,
 };
-use accurate_geom::Rig;
+use accurate_geom::{Curve3, Rig};
 use ndarray::Array2;
 
 use super::RobustParams;
@@ -11,6 +11,8 @@ use super::joint::JointResult;
 use super::look::Seen;
 use super::score::Candidate;
 use super::side_by_side::side_by_side;
+use super::suspicion::Suspicion;
+use super::tails::{DOUBTED_LACKING_PX, Pictures};
 use crate::IntensityDiagnostics;
 
 /// A curve of the maps is right to a few pixels or is another curve: what is carried farther than this,
@@ -96,26 +98,58 @@ fn differing(contenders: &[(&Candidate, f64)]) -> Vec<usize> {
     kept
 }
 
-/// Fits the curve on to the grey levels of the images that its maps were made of, and says what came of
-/// it. Where that fails, or is carried off, or the body is no thin one, the curve stays as it was.
+/// Fits the curve on to the grey levels of the images that its `maps` were made of, without ends that those do
+/// not show, and says what came of it. Where that fails, or is carried off, or the body is no thin one, the
+/// curve stays as it was.
 pub(crate) fn on_grey_levels(
     result: &mut JointResult,
     images: &[Array2<f32>; 2],
+    maps: Option<&[Array2<f32>; 2]>,
     given_rig: &Rig,
     params: &RobustParams,
     overruled_by: Option<f64>,
 ) -> IntensityDiagnostics {
+    let fit = |start: &Curve3, calibration| {
+        fit_intensities(start, images, given_rig, &IntensityFitParams::DEFAULT, calibration)
+    };
     let start = &result.fit.curve;
     let calibration = start_of_calibration(params, result.calibration.as_ref());
-    let fitted =
-        fit_intensities(start, images, given_rig, &IntensityFitParams::DEFAULT, calibration);
-    let diagnostics = IntensityDiagnostics { overruled_by, ..IntensityDiagnostics::of(&fitted) };
+    let mut fitted = fit(start, calibration);
+    let (mut cut_px, mut lacking_px) = ([0.0; 2], None);
+    if let (Ok(thin), Some(maps)) = (&fitted, maps)
+        && not_thin(thin).is_none()
+    {
+        // An end that is none of the body may be what the curve was carried off by.
+        let (curve, calibration) = match reason_against(thin) {
+            None => (&thin.curve, start_of_calibration(params, thin.calibration.as_ref())),
+            Some(_) => (start, calibration),
+        };
+        let pictures = Pictures { images, maps, rig: given_rig, calibration };
+        let ends = pictures.ends(curve);
+        lacking_px = Some(ends.lacking_px);
+        if let Some(shorter) = &ends.shorter {
+            let again = fit(shorter, calibration);
+            if again.as_ref().is_ok_and(|fit| reason_against(fit).is_none()) {
+                (fitted, cut_px) = (again, ends.cut_px);
+            }
+        }
+    }
+    let diagnostics = IntensityDiagnostics {
+        overruled_by,
+        lacking_px,
+        cut_px,
+        ..IntensityDiagnostics::of(&fitted)
+    };
     if let (None, Ok(IntensityFit { curve, covariance, calibration, .. })) =
         (&diagnostics.refusal, fitted)
     {
         result.fit.curve = curve;
         result.fit.covariance = Some(covariance);
         result.calibration = calibration;
+    }
+    if lacking_px.is_some_and(|px| px > DOUBTED_LACKING_PX) {
+        result.suspicions.push(Suspicion::EndNotShown);
+        result.suspicions.sort_unstable();
     }
     diagnostics
 }
@@ -138,6 +172,8 @@ impl IntensityDiagnostics {
                 Ok(fit) => reason_against(fit),
             },
             overruled_by: None,
+            lacking_px: None,
+            cut_px: [0.0; 2],
             moved_px: fit.map(|fit| fit.moved_px),
             contrast_to_noise: fit.map(|fit| fit.contrast_to_noise),
             radius_px: fit.map(|fit| fit.radius_px),
@@ -146,11 +182,17 @@ impl IntensityDiagnostics {
 }
 
 fn reason_against(fit: &IntensityFit) -> Option<String> {
+    if fit.moved_px > MOST_MOVED_PX {
+        return Some(format!("carried off by {:.1} px, {MOST_MOVED_PX} at most", fit.moved_px));
+    }
+    not_thin(fit)
+}
+
+/// Why a body is placed better by its edges, if so.
+fn not_thin(fit: &IntensityFit) -> Option<String> {
     let radius_px = 0.5 * (fit.radius_px[0] + fit.radius_px[1]);
     let contrast = fit.contrast_to_noise[0].min(fit.contrast_to_noise[1]);
-    if fit.moved_px > MOST_MOVED_PX {
-        Some(format!("carried off by {:.1} px, {MOST_MOVED_PX} at most", fit.moved_px))
-    } else if radius_px > MOST_RADIUS_PX {
+    if radius_px > MOST_RADIUS_PX {
         Some(format!(
             "a body of radius {radius_px:.2} px is drawn as it is, {MOST_RADIUS_PX} at most"
         ))

@@ -203,6 +203,7 @@ pub(crate) fn reconstruct_masks(
         None
     };
     let mut result = seen.into_result(limits);
-    result.grey_levels = Some(on_grey_levels(&mut result, images, rig, params, overruled_by));
+    result.grey_levels =
+        Some(on_grey_levels(&mut result, images, probabilities, rig, params, overruled_by));
     Ok(result)
 }

@@ -25,6 +25,7 @@ mod side_by_side;
 mod start;
 mod strays;
 mod suspicion;
+mod tails;
 
 pub(crate) use candidates::ViewCandidates;
 pub use evidence::Evidence;

@@ -27,6 +27,9 @@ pub enum Suspicion {
     Uncertain,
     /// The curve runs back over itself in both views, as hardly any body does.
     TurnsBack,
+    /// An end of the curve goes on, or was cut off where it went on, by one view's segmentation alone: the
+    /// pictures do not show it.
+    EndNotShown,
     /// Ordered points were matched, but the match is no basis for an adjustment.
     NotAdjusted,
 }
@@ -73,13 +76,13 @@ impl DoubtLimits {
         sigma_px: 1.9,
     };
 
-    /// Of a network's probability maps, which add short pieces to right curves, and whose points lie
-    /// nearer to a right one than whole pixels: chosen on 340 generated pairs of images of tuning
-    /// seeds (`medium`, `carm`, `easy`; 31 of them wrong by more than 5 px).
+    /// Of a network's probability maps, which add short pieces to right curves: chosen on 340 generated
+    /// pairs of images of tuning seeds (`medium`, `carm`, `easy`; 31 of them wrong by more than 5 px), the
+    /// residual on 300 of `carm` (docs/segmentation.md).
     pub const MAPS: Self = Self {
         unexplained: 1.0,
         unexplained_at_bridges: 1.0,
-        chi_per_point_px2: 0.058,
+        chi_per_point_px2: 0.068,
         margin: 2.0,
         sigma_px: 1.9,
     };
@@ -174,6 +177,7 @@ impl fmt::Display for Suspicion {
             Self::ViewsDisagree => "views disagree",
             Self::Uncovered => "part of the body left out",
             Self::TurnsBack => "turns back",
+            Self::EndNotShown => "end not shown",
             Self::NotAdjusted => "match not adjusted",
         })
     }
@@ -279,14 +283,10 @@ mod tests {
     }
 
     #[test]
-    fn a_map_may_leave_short_pieces_unexplained_but_its_points_must_lie_nearer() {
-        let of_maps = |evidence: &Evidence| evidence.suspicions(&DoubtLimits::MAPS);
-        let pieces = Evidence { unexplained: 0.5, chi_per_point: 0.04, ..GOOD };
-        assert!(of_maps(&pieces).is_empty());
+    fn a_map_may_leave_short_pieces_unexplained() {
+        let pieces = Evidence { unexplained: 0.5, ..GOOD };
+        assert!(pieces.suspicions(&DoubtLimits::MAPS).is_empty());
         assert_eq!(of_masks(&pieces), [Suspicion::UnexplainedOutline]);
-        let far = Evidence { chi_per_point: 0.06, ..GOOD };
-        assert_eq!(of_maps(&far), [Suspicion::Misfit]);
-        assert!(of_masks(&far).is_empty());
     }
 
     #[test]
