@@ -1,6 +1,9 @@
 use std::io::{IsTerminal, Write};
+use std::ops::ControlFlow;
+use std::sync::OnceLock;
 use std::time::Duration;
 
+use accurate3d::seg::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -69,13 +72,39 @@ impl Console {
         if self.quiet || total < 2 {
             return ProgressBar::hidden();
         }
-        let bar = ProgressBar::new(total as u64).with_message(what);
-        if let Ok(style) = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len}, {eta} left") {
-            bar.set_style(style);
-        }
-        bar.enable_steady_tick(Duration::from_millis(200));
-        bar
+        bar(total, what)
     }
+
+    /// The same for the windows of large images, `count` of which are looked at; where those are several, or
+    /// an image is small, nothing.
+    pub fn windows(&self, count: usize) -> impl Fn(Progress) -> ControlFlow<()> + Sync + use<> {
+        const LEAST: usize = 4;
+        let shown = !self.quiet && count == 1;
+        let current = OnceLock::new();
+        move |Progress { done, total }| {
+            if shown && total >= LEAST {
+                let bar = current.get_or_init(|| bar(total, "segmenting"));
+                if bar.is_finished() {
+                    bar.reset();
+                }
+                bar.set_length(total as u64);
+                bar.set_position(done as u64);
+                if done == total {
+                    bar.finish_and_clear();
+                }
+            }
+            ControlFlow::Continue(())
+        }
+    }
+}
+
+fn bar(total: usize, what: &'static str) -> ProgressBar {
+    let bar = ProgressBar::new(total as u64).with_message(what);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len}, {eta} left") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
 }
 
 /// A line of prose. Where nobody reads stderr (`2>&1 | head`) there is nobody to tell either.

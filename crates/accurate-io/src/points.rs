@@ -9,7 +9,8 @@ use crate::matrix::{finite, parse_number};
 
 /// Reads ordered centreline points (`points_L.csv`) of view `V`: a header with the columns `x` and
 /// `y` in px, then one point per line, in order. Other columns are ignored, but with a column `z` it is a
-/// curve in space, and refused. Points may lie outside the image.
+/// curve in space, and refused, as is the ridge that `accurate segment` writes, which is in no order.
+/// Points may lie outside the image.
 ///
 /// # Errors
 /// [`IoError::NotANumber`] or [`IoError::NotFinite`] with line and column; [`IoError::Malformed`]
@@ -18,8 +19,14 @@ use crate::matrix::{finite, parse_number};
 pub fn read_points<V: View>(path: &Path) -> Result<Vec<Pixel<V>>, IoError> {
     let table = CsvTable::read(path)?;
     let (x, y) = (table.column("x")?, table.column("y")?);
-    if table.header.iter().any(|name| name == "z") {
+    let has = |column: &str| table.header.iter().any(|name| name == column);
+    if has("z") {
         let reason = "a column `z`: this is a curve in space, not points of an image";
+        return Err(IoError::malformed(path, "points", Some(1), reason));
+    }
+    if has("direction_x") && has("probability") {
+        let reason = "the ridge that `accurate segment` found, row by row and not in order along a body: \
+                      reconstruct from the mask, or order it with `accurate trace`";
         return Err(IoError::malformed(path, "points", Some(1), reason));
     }
     let mut points = Vec::new();
@@ -192,6 +199,16 @@ mod tests {
     fn columns_are_found_by_name_and_negative_pixels_are_kept() {
         let points = read(b"y, x ,radius\r\n774.1,-7.03,0.4\r\n5,6,7\r\n").unwrap();
         assert_eq!(points, [Pixel::new(-7.03, 774.1), Pixel::new(6.0, 5.0)]);
+    }
+
+    #[test]
+    fn what_is_no_ordered_curve_of_an_image_says_so() {
+        let space = read(b"x,y,z\n1,2,3\n").unwrap_err().to_string();
+        assert!(space.contains("curve in space"), "{space}");
+        let ridge = read(b"x,y,direction_x,direction_y,width_px,probability\n1,2,1,0,3,0.9\n");
+        let ridge = ridge.unwrap_err().to_string();
+        assert!(ridge.contains("accurate trace"), "{ridge}");
+        assert_eq!(read(b"x,y,probability\n1,2,0.9\n").unwrap().len(), 1);
     }
 
     #[test]

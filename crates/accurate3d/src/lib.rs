@@ -47,6 +47,7 @@ mod c_arm;
 mod careful_look;
 mod diagnostics;
 mod direction;
+mod disorder;
 pub mod doctor;
 mod error;
 mod explanation;

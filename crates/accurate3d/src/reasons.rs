@@ -50,6 +50,11 @@ impl Diagnostics {
                 }
                 found.lacking_px.map(|px| format!("{px:.0} px are lacking in pictures and maps"))
             }),
+            Suspicion::NotInOrder => Some(
+                "many lie nearer to others than to those beside them in the list; `accurate trace` orders \
+                 a mask"
+                    .to_owned(),
+            ),
             Suspicion::NotAdjusted => self.not_adjusted.clone(),
         }
     }

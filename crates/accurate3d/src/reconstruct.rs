@@ -9,13 +9,14 @@ use accurate_traverse::{TraverseParams, trace_pair};
 use ndarray::Array2;
 
 use crate::direction::runs_against;
+use crate::disorder::is_disordered;
 use crate::ordered_points::adjusted_points;
 use crate::require::{require_one_size, require_segmented};
 use crate::robust::{reconstruct_masks, without_strays};
 use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled, sampled_ring};
 use crate::{
-    Diagnostics, Error, Explanation, InputKind, Method, Reconstruction, RobustParams, Traces,
-    UnknownName, ViewPair,
+    Diagnostics, Error, Explanation, InputKind, Method, Reconstruction, RobustParams, Suspicion,
+    Traces, UnknownName, ViewPair,
 };
 
 /// What to do with a pair.
@@ -152,6 +153,16 @@ impl Params {
 /// # Errors
 /// [`Error`], which names the case and the stage; never an empty curve, never a NaN.
 pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
+    let mut found = reconstruct_as_given(pair, params)?;
+    if let (InputKind::Points, Some((points1, points2))) = (params.input, &pair.points)
+        && (is_disordered(points1) || is_disordered(points2))
+    {
+        found.diagnostics.suspicions.push(Suspicion::NotInOrder);
+    }
+    Ok(found)
+}
+
+fn reconstruct_as_given(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
     if params.input == InputKind::Image {
         require_segmented(pair)?;
     }

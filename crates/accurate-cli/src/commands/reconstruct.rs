@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use accurate3d::fit::CalibrationPriors;
 use accurate3d::io::{PairParts, Truth, find_pairs, hash_file, hash_pair, pair_files, read_pair};
 use accurate3d::seg::network::NetworkSegmenter;
-use accurate3d::seg::{Polarity, Segmenter, unwatched};
+use accurate3d::seg::{Polarity, Segmenter, Watch};
 use accurate3d::{
     Closure, InputKind, Method, NOT_FOR_CLINICAL_USE, Params, Reconstruction, ViewPair,
     reconstruct, reconstruct_images, segment_images,
@@ -43,11 +43,12 @@ pub fn run(args: &ReconstructArgs, config: &str, console: &Console) -> Result<()
         InputKind::Image => Some(segmenter(&args.model, console)?),
         InputKind::Points | InputKind::Mask => None,
     };
-    let bar = console.progress(jobs.len(), "reconstructing");
+    let (bar, watch) =
+        (console.progress(jobs.len(), "reconstructing"), console.windows(jobs.len()));
     let results: Vec<Result<Done, Failure>> = jobs
         .par_iter()
         .map(|(source, out)| {
-            let result = one(source, out, args, segmenter.as_ref());
+            let result = one(source, out, args, segmenter.as_ref(), &watch);
             bar.inc(1);
             result
         })
@@ -292,6 +293,7 @@ fn one(
     out: &Outputs,
     args: &ReconstructArgs,
     segmenter: Option<&NetworkSegmenter>,
+    watch: &Watch<'_>,
 ) -> Result<Done, Failure> {
     let Read { mut pair, shown, inputs } = read(source, args, out.has_report())?;
     let polarity = args.grey.polarity();
@@ -299,14 +301,14 @@ fn one(
     check_points(&pair)?;
     check_views(&pair)?;
     let pair = match segmenter {
-        Some(segmenter) => segment_images(pair, segmenter, &unwatched)?,
+        Some(segmenter) => segment_images(pair, segmenter, watch)?,
         None => pair,
     };
     let mut params = Params::new(args.input, args.method);
     params.robust.calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
     params.closure = args.closed;
     let (reconstruction, seen) = match segmenter {
-        Some(segmenter) => reconstruct_images(&pair, &params, segmenter, &unwatched)?,
+        Some(segmenter) => reconstruct_images(&pair, &params, segmenter, watch)?,
         None => (reconstruct(&pair, &params)?, None),
     };
     let pair = seen.unwrap_or(pair);

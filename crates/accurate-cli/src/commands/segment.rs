@@ -5,8 +5,8 @@ use accurate3d::NOT_FOR_CLINICAL_USE;
 use accurate3d::io::{FrameChoice, is_dicom, write_mask, write_rgb, write_u16};
 use accurate3d::seg::network::{NetworkOptions, NetworkSegmenter};
 use accurate3d::seg::{
-    Components, Mask, Polarity, PostProcessing, RidgeParams, RidgePoint, Segmenter,
-    median_ridge_width_px, median_width_px, ridge_centreline, unwatched, zhang_suen,
+    Components, Mask, Polarity, PostProcessing, RidgeParams, RidgePoint, Segmenter, Watch,
+    median_ridge_width_px, median_width_px, ridge_centreline, zhang_suen,
 };
 use ndarray::Array2;
 use serde_json::{Value, json};
@@ -31,11 +31,11 @@ pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
         ..options
     })?;
     make_folder(&args.out)?;
-    let bar = console.progress(jobs.len(), "segmenting");
+    let (bar, watch) = (console.progress(jobs.len(), "segmenting"), console.windows(jobs.len()));
     let (mut failed, mut first_failure) = (0, None);
     for job in &jobs {
         let image = &job.image;
-        match one(job, &args.out, polarity, &segmenter) {
+        match one(job, &args.out, polarity, &segmenter, &watch) {
             Ok(report) if console.json => console.json(&report)?,
             Ok(report) => console.data(&line(&report))?,
             Err(failure) => {
@@ -117,6 +117,7 @@ fn one(
     out: &Path,
     polarity: Polarity,
     segmenter: &NetworkSegmenter,
+    watch: &Watch<'_>,
 ) -> Result<Value, Failure> {
     let Job { image: path, name, frame } = job;
     let image = read_picture(path, frame.is_some(), frame.unwrap_or(FrameChoice::Mean))?;
@@ -125,7 +126,7 @@ fn one(
         Some(FrameChoice::Mean) => "mean".into(),
         Some(FrameChoice::One(index)) => (*index).into(),
     };
-    let found = segmenter.segment(&polarity.with_body_dark(image.clone()), &unwatched)?;
+    let found = segmenter.segment(&polarity.with_body_dark(image.clone()), watch)?;
     let skeleton = zhang_suen(&found.mask);
     let width = if found.mask.is_empty() { None } else { Some(median_width_px(&found.mask)?) };
     let params = RidgeParams::for_width(width.unwrap_or(1.0));

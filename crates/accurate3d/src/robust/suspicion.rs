@@ -32,6 +32,8 @@ pub enum Suspicion {
     EndNotShown,
     /// Ordered points were matched, but the match is no basis for an adjustment.
     NotAdjusted,
+    /// Ordered points jump to and fro, as the pixels of a skeleton do row by row.
+    NotInOrder,
 }
 
 /// Limits of the [`Evidence`], beyond which it is a reason for doubt: a result without a reason is
@@ -179,6 +181,7 @@ impl fmt::Display for Suspicion {
             Self::TurnsBack => "turns back",
             Self::EndNotShown => "end not shown",
             Self::NotAdjusted => "match not adjusted",
+            Self::NotInOrder => "points in no order",
         })
     }
 }
