@@ -1,10 +1,10 @@
 use accurate_fit::{
     CalibrationPriors, CurveEnd, FitError, IntensityFitParams, IntensityPair, ShownPiece,
 };
-use accurate_geom::{Curve3, Point2, Point3, Rig};
+use accurate_geom::{Curve3, Point2, Rig};
 use ndarray::Array2;
 
-use super::shape::{dense, px_per_unit};
+use super::shape::{arc_lengths_px, dense, px_per_unit};
 use super::start::through;
 
 /// Pictures and maps together must show a piece of an end to this degree, or it lacks what is missing: as
@@ -59,11 +59,10 @@ impl Pictures<'_> {
             }
             let points = dense(curve, self.rig);
             let scale = px_per_unit(&points, self.rig);
-            let count = points.len() - 1;
-            let gone = (px / curve_length_px(&points, scale) * count as f64).round() as usize;
+            let gone = arc_lengths_px(&points, scale).partition_point(|arc| *arc < px);
             let kept = match end {
-                CurveEnd::Begin => &points[gone.min(count)..],
-                CurveEnd::End => &points[..=count - gone.min(count)],
+                CurveEnd::Begin => &points[gone..],
+                CurveEnd::End => &points[..points.len() - gone],
             };
             let Some(shorter) = through(kept, scale) else { break };
             found.cut_px[usize::from(end == CurveEnd::End)] = px;
@@ -110,20 +109,17 @@ impl Pictures<'_> {
 
 /// The largest value within a pixel; 0 outside.
 fn most_near(map: &Array2<f32>, at: Point2) -> f64 {
-    let near = |value: f64| (-1..=1).map(move |d| value.round() as i64 + d);
+    let near = |value: f64| (-1..=1).map(move |d| (value.round() as i64).saturating_add(d));
     let values = near(at.y).flat_map(|y| near(at.x).map(move |x| (y, x))).filter_map(|(y, x)| {
         map.get((usize::try_from(y).ok()?, usize::try_from(x).ok()?)).copied()
     });
     f64::from(values.fold(0.0, f32::max))
 }
 
-fn curve_length_px(points: &[Point3], px_per_unit: f64) -> f64 {
-    points.windows(2).map(|w| (w[1] - w[0]).norm()).sum::<f64>() * px_per_unit
-}
-
 #[cfg(test)]
 mod tests {
     use accurate_eval::curve_scores;
+    use accurate_geom::Point3;
     use accurate_synth::{CaseOptions, Family, SynthCase, XrayOptions, generate, render_xray};
 
     use super::*;
@@ -227,7 +223,7 @@ mod tests {
         let mut map = Array2::zeros((8, 9));
         map[(3, 4)] = 0.7;
         assert_eq!(most_near(&map, Point2::new(5.2, 1.8)), f64::from(0.7_f32));
-        for (x, y) in [(5.6, 3.0), (4.0, 1.4), (-3.0, 3.0), (4.0, 1e9), (f64::NAN, -9.0)] {
+        for (x, y) in [(5.6, 3.0), (4.0, 1.4), (-3.0, 3.0), (4.0, 1e300), (f64::NAN, -9.0)] {
             assert_eq!(most_near(&map, Point2::new(x, y)), 0.0, "{x} {y}");
         }
     }
