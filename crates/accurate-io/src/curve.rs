@@ -14,11 +14,11 @@ const WRITTEN: &str = ".csv, .ply, .vtp, .mrk.json, .npy, .npz, .parquet";
 const WRITTEN: &str = ".csv, .ply, .vtp, .mrk.json, .npy, .npz";
 
 /// The extensions [`read_curve`] knows.
-const READ: &str = ".csv, .ply, .vtp, .mrk.json, .npy";
+const READ: &str = ".csv, .ply, .vtp, .mrk.json, .npy, .npz";
 
 /// Most columns a curve may have. Names are compared with one another, so that a file of a million
 /// columns would take hours.
-const MAX_COLUMNS: usize = 1024;
+pub(crate) const MAX_COLUMNS: usize = 1024;
 
 /// A 3D curve with values per point, as it goes to and comes from a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -133,7 +133,9 @@ pub fn write_curve(path: &Path, curve: &CurveTable) -> Result<(), IoError> {
 ///   (`positionStatus` undefined, preview or missing) are left out, with their values, as Slicer
 ///   leaves them out of its curve.
 ///
-/// `.npz` and `.parquet` are written, not read.
+/// - `.npz` with an array `points`, N x 3; other arrays of N numbers are columns.
+///
+/// `.parquet` is written, not read.
 ///
 /// A file that names no unit gives [`LengthUnit::Unit`], one that names another than mm, cm, m and
 /// `unit` is refused; a CSV file names it in the column `arc_length[..]`.
@@ -148,6 +150,7 @@ pub fn read_curve(path: &Path) -> Result<CurveTable, IoError> {
         "vtp" => vtp::read(path)?,
         "mrk.json" => markups::read(path)?,
         "npy" => npy::read(path)?,
+        "npz" => npz::read(path)?,
         _ => return Err(unknown_extension(path, READ)),
     };
     curve.check(path)?;

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use accurate_geom::{LengthUnit, Point3};
-use ndarray::{Array2, Array4};
+use ndarray::{Array2, Array4, ArrayD};
 use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
 
@@ -17,11 +17,28 @@ const MAX_HEADER_BYTES: usize = 4096;
 const MAX_NESTING: usize = 4;
 
 pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
-    let bytes = read_bytes(path, MAX_POINTS_BYTES)?;
+    parse_points(path, &read_bytes(path, MAX_POINTS_BYTES)?)
+}
+
+/// The points of an array's bytes, without columns and unit.
+pub(crate) fn parse_points(path: &Path, bytes: &[u8]) -> Result<CurveTable, IoError> {
+    let values = parse(path, bytes)?;
+    let &[rows, 3] = values.shape() else {
+        let reason = format!("shape {:?}; expected (N, 3)", values.shape());
+        return Err(IoError::malformed(path, "NPY", None, reason));
+    };
+    if rows == 0 {
+        return Err(IoError::Empty { path: path.to_owned(), what: "points" });
+    }
+    let row = |k: usize| Point3::new(values[[k, 0]], values[[k, 1]], values[[k, 2]]);
+    Ok(CurveTable::from_points((0..rows).map(row).collect(), LengthUnit::Unit))
+}
+
+/// An array's bytes as doubles, of any shape.
+pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<ArrayD<f64>, IoError> {
     let malformed = |reason: String| IoError::malformed(path, "NPY", None, reason);
-    let data_length = check_header(&bytes).map_err(malformed)?;
-    let header =
-        Header::from_reader(&mut bytes.as_slice()).map_err(|e| malformed(e.to_string()))?;
+    let data_length = check_header(bytes).map_err(malformed)?;
+    let header = Header::from_reader(&mut &*bytes).map_err(|e| malformed(e.to_string()))?;
     let descriptor = header.type_descriptor.to_string();
     let item_bytes = match descriptor.trim_matches('\'') {
         "<f8" | ">f8" => 8,
@@ -36,24 +53,17 @@ pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
             });
         }
     };
-    let [rows, 3] = header.shape[..] else {
-        return Err(malformed(format!("shape {:?}; expected (N, 3)", header.shape)));
-    };
     // The shape is a claim of the file: compare it with the bytes before memory is taken for it.
-    if rows.checked_mul(3 * item_bytes) != Some(data_length) {
+    let claimed = header.shape.iter().try_fold(item_bytes, |size: usize, n| size.checked_mul(*n));
+    if claimed != Some(data_length) {
         return Err(malformed(format!("shape {:?} but {data_length} bytes of data", header.shape)));
     }
-    if rows == 0 {
-        return Err(IoError::Empty { path: path.to_owned(), what: "points" });
-    }
-    let array = if item_bytes == 8 {
-        Array2::<f64>::read_npy(bytes.as_slice())
+    if item_bytes == 8 {
+        ArrayD::<f64>::read_npy(bytes)
     } else {
-        Array2::<f32>::read_npy(bytes.as_slice()).map(|a| a.mapv(f64::from))
+        ArrayD::<f32>::read_npy(bytes).map(|a| a.mapv(f64::from))
     }
-    .map_err(|e| malformed(e.to_string()))?;
-    let points = array.rows().into_iter().map(|r| Point3::from_slice(&r.to_vec())).collect();
-    Ok(CurveTable::from_points(points, LengthUnit::Unit))
+    .map_err(|e| malformed(e.to_string()))
 }
 
 pub(crate) fn write(path: &Path, curve: &CurveTable) -> Result<(), IoError> {

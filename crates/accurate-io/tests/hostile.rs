@@ -143,7 +143,7 @@ fn seeds(dir: &Path) -> Vec<(&'static str, Read)> {
         columns: vec![column("arc_length", "mm", 1.25), column("flag", "", 1.0)],
         points: truth.clone(),
     };
-    for name in ["curve.csv", "binary.ply", "curve.vtp", "curve.npy"] {
+    for name in ["curve.csv", "binary.ply", "curve.vtp", "curve.npy", "curve.npz"] {
         write_curve(&dir.join(name), &curve_table).unwrap();
     }
     accurate_io::write_ply_points(&dir.join("ascii.ply"), &truth, PlyEncoding::Ascii).unwrap();
@@ -181,6 +181,7 @@ fn seeds(dir: &Path) -> Vec<(&'static str, Read)> {
         ("binary.ply", curve),
         ("curve.vtp", curve),
         ("curve.npy", curve),
+        ("curve.npz", curve),
         ("grey8.png", image),
         ("grey16.png", image),
         ("image.tiff", image),

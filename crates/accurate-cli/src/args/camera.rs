@@ -117,7 +117,7 @@ The second view has the optics and distances of the first. A camera that looks a
 a DICOM C-arm at its isocentre, turns about it, and the angles are its own; any other camera turns about
 the middle of the shape, from (0, 0).")]
 pub struct PlanArgs {
-    /// The body as far as it is known: a curve file (csv, ply, vtp, npy, mrk.json), points in order,
+    /// The body as far as it is known: a curve file (csv, ply, vtp, npy, npz, mrk.json), points in order,
     /// in the world of the first view.
     #[arg(long, value_name = "CURVE")]
     pub shape: PathBuf,

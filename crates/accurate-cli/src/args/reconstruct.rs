@@ -17,7 +17,7 @@ pub struct ReconstructArgs {
     pub input: InputKind,
     #[command(flatten)]
     pub views: ViewArgs,
-    /// The true curve of two views given as files (csv, ply, vtp, npy or mrk.json), to score against.
+    /// The true curve of two views given as files (csv, ply, vtp, npy, npz or mrk.json), to score against.
     #[arg(long, value_name = "FILE")]
     pub truth: Option<PathBuf>,
     /// Frame of DICOM runs, from 0; once for both views or once for each (default: the mean over all

@@ -8,9 +8,9 @@ use super::{Disturbances, ModelArgs, PointsKind};
 
 #[derive(Debug, Args)]
 pub struct EvalArgs {
-    /// The curve: csv, ply, vtp, npy or mrk.json.
+    /// The curve: csv, ply, vtp, npy, npz or mrk.json.
     pub curve: PathBuf,
-    /// The truth: csv, ply, vtp, npy or mrk.json, points in order, in the unit of the curve.
+    /// The truth: csv, ply, vtp, npy, npz or mrk.json, points in order, in the unit of the curve.
     #[arg(long, value_name = "FILE")]
     pub truth: PathBuf,
     /// Arc length between the samples of the point-to-polyline scores, in the curve's unit
