@@ -66,6 +66,22 @@ pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<ArrayD<f64>, IoError> {
     .map_err(|e| malformed(e.to_string()))
 }
 
+/// The bytes of an array of bytes.
+pub(crate) fn parse_bytes<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8], IoError> {
+    let malformed = |reason: String| IoError::malformed(path, "NPY", None, reason);
+    let data_length = check_header(bytes).map_err(malformed)?;
+    let header = Header::from_reader(&mut &*bytes).map_err(|e| malformed(e.to_string()))?;
+    let descriptor = header.type_descriptor.to_string();
+    if descriptor.trim_matches('\'') != "|u1" || header.shape != [data_length] {
+        return Err(malformed(format!(
+            "{} of shape {:?} in {data_length} bytes; expected one row of bytes",
+            crate::error::cut(&descriptor, 40),
+            header.shape
+        )));
+    }
+    Ok(&bytes[bytes.len() - data_length..])
+}
+
 pub(crate) fn write(path: &Path, curve: &CurveTable) -> Result<(), IoError> {
     let values = curve.points.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
     let failed = |e: String| IoError::system(path, "encode", std::io::Error::other(e));

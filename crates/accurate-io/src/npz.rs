@@ -2,14 +2,14 @@ use std::io::{Cursor, Read};
 use std::path::Path;
 
 use ndarray::{Array1, Array2, Ix1};
-use ndarray_npy::{NpzWriter, ReadNpyExt};
+use ndarray_npy::NpzWriter;
 use zip::ZipArchive;
 
 use crate::IoError;
 use crate::atomic::write_atomically;
 use crate::bounded::{MAX_POINTS_BYTES, read_bytes};
 use crate::curve::{Column, CurveTable, MAX_COLUMNS};
-use crate::npy::{check_header, parse, parse_points};
+use crate::npy::{parse, parse_bytes, parse_points};
 use crate::unit::length_unit;
 
 /// Name of the array with the points.
@@ -77,9 +77,8 @@ pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
     let mut curve = parse_points(path, &array(POINTS)?)?;
     let units = if names.iter().any(|name| name == UNITS) {
         let bytes = array(UNITS)?;
-        check_header(&bytes).map_err(malformed)?;
-        let text = Array1::<u8>::read_npy(&*bytes).map_err(|e| malformed(e.to_string()))?;
-        let object: Result<serde_json::Map<_, _>, _> = serde_json::from_slice(&text.to_vec());
+        let object: Result<serde_json::Map<_, _>, _> =
+            serde_json::from_slice(parse_bytes(path, &bytes)?);
         object.map_err(|e| malformed(format!("`{UNITS}`: {e}")))?
     } else {
         serde_json::Map::new()
@@ -208,8 +207,15 @@ mod tests {
         assert!(none.contains("no array `points`"), "{none}");
         let flat = refused(&[("points.npy", npy(&Array1::from_elem(12, 1.0)))], true);
         assert!(flat.contains("expected (N, 3)"), "{flat}");
-        let units = ("units_json.npy", b"no array".to_vec());
-        refused(&[("points.npy", points.clone()), units], false);
+        // A claim of a terabyte of units takes no memory.
+        let mut claim = npy(&Array1::from_elem(16, 1.0));
+        let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (1000000000000,), }";
+        claim[10..10 + header.len()].copy_from_slice(header.as_bytes());
+        claim[10 + header.len()..127].fill(b' ');
+        for units in [b"no array".to_vec(), claim] {
+            let error = refused(&[("points.npy", points.clone()), ("units_json.npy", units)], true);
+            assert!(error.contains("NPY"), "{error}");
+        }
         // A megabyte that unpacks to more than any file may hold.
         let bomb = archive(&[("points.npy", vec![0; MAX_POINTS_BYTES as usize + 2])], true);
         assert!(bomb.len() < 2_000_000);

@@ -51,7 +51,9 @@ pub struct CurveEnds<'a> {
 }
 
 impl IntensityPair {
-    /// A curve, one of those that the pair is around, to ask how far the pictures show its ends.
+    /// A curve, one of those that the pair is around, to ask how far the pictures show its ends. Like the
+    /// start of a fit it is continued at both by
+    /// [`extension_px`](crate::IntensityFitParams::extension_px).
     ///
     /// # Errors
     /// As [`fit_intensities`](crate::fit_intensities).
@@ -87,7 +89,7 @@ impl CurveEnds<'_> {
     }
 
     /// How far the pictures show what of the curve lies beyond `cut_px` from one of its ends, the rest of it
-    /// taken for granted; from the end inwards. None if that is all of the curve.
+    /// taken for granted; from the end inwards. None if that is all of the curve, or nothing.
     ///
     /// A piece is drawn as dark as the curve is on average. Where the picture has all of that darkness beside
     /// what the rest of the curve explains, drawing it explains as much as its own square; where it has none,
