@@ -37,8 +37,7 @@ pub(crate) fn parse_points(path: &Path, bytes: &[u8]) -> Result<CurveTable, IoEr
 /// An array's bytes as doubles, of any shape.
 pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<ArrayD<f64>, IoError> {
     let malformed = |reason: String| IoError::malformed(path, "NPY", None, reason);
-    let data_length = check_header(bytes).map_err(malformed)?;
-    let header = Header::from_reader(&mut &*bytes).map_err(|e| malformed(e.to_string()))?;
+    let (header, data_length) = header(path, bytes)?;
     let descriptor = header.type_descriptor.to_string();
     let item_bytes = match descriptor.trim_matches('\'') {
         "<f8" | ">f8" => 8,
@@ -69,8 +68,7 @@ pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<ArrayD<f64>, IoError> {
 /// The bytes of an array of bytes.
 pub(crate) fn parse_bytes<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8], IoError> {
     let malformed = |reason: String| IoError::malformed(path, "NPY", None, reason);
-    let data_length = check_header(bytes).map_err(malformed)?;
-    let header = Header::from_reader(&mut &*bytes).map_err(|e| malformed(e.to_string()))?;
+    let (header, data_length) = header(path, bytes)?;
     let descriptor = header.type_descriptor.to_string();
     if descriptor.trim_matches('\'') != "|u1" || header.shape != [data_length] {
         return Err(malformed(format!(
@@ -100,8 +98,16 @@ pub fn write_npy_u8(path: &Path, array: &Array4<u8>) -> Result<(), IoError> {
     write_atomically(path, |w| array.write_npy(w).map_err(std::io::Error::other))
 }
 
+/// An array's header, and the number of bytes behind it.
+pub(crate) fn header(path: &Path, bytes: &[u8]) -> Result<(Header, usize), IoError> {
+    let malformed = |reason: String| IoError::malformed(path, "NPY", None, reason);
+    let data_length = check_header(bytes).map_err(malformed)?;
+    let header = Header::from_reader(&mut &*bytes).map_err(|e| malformed(e.to_string()))?;
+    Ok((header, data_length))
+}
+
 /// Refuses a header the parser should not see, and returns the number of bytes behind it.
-pub(crate) fn check_header(bytes: &[u8]) -> Result<usize, String> {
+fn check_header(bytes: &[u8]) -> Result<usize, String> {
     let short = || "the file ends within the header".to_owned();
     let major = *bytes.get(6).ok_or_else(short)?;
     let (length, start) = if major == 1 {

@@ -3,7 +3,7 @@ use accurate_geom::{Pixel, View};
 /// A list whose points lie nearer to others than to their neighbours in it in more than this part is in no
 /// order. Of ordered ones up to 0.05 do, where strands cross; of skeleton pixels row by row 0.14 to 0.7.
 const MOST: f64 = 0.1;
-/// So many points are asked at most, px.
+/// So many points are asked at most.
 const ASKED: usize = 500;
 /// Neighbours in the list that are no farther apart do not jump, px: points may be as near as noise allows.
 const STEP_PX: f64 = 3.0;
@@ -19,9 +19,8 @@ pub(crate) fn is_disordered<V: View>(points: &[Pixel<V>]) -> bool {
     if points.len() < FEWEST {
         return false;
     }
-    let asked: Vec<usize> =
-        (0..ASKED.min(points.len())).map(|k| k * points.len() / ASKED.min(points.len())).collect();
-    let jumps = |&&k: &&usize| {
+    let asked = ASKED.min(points.len());
+    let jumps = |&k: &usize| {
         let next = |j: Option<&Pixel<V>>| j.map_or(0.0, |p| p.distance(points[k]));
         let before = k.checked_sub(1).and_then(|j| points.get(j));
         let step = next(before).max(next(points.get(k + 1)));
@@ -31,7 +30,8 @@ pub(crate) fn is_disordered<V: View>(points: &[Pixel<V>]) -> bool {
                 .enumerate()
                 .any(|(j, p)| j.abs_diff(k) > 1 && p.distance(points[k]) < NEARER * step)
     };
-    asked.iter().filter(jumps).count() as f64 > MOST * asked.len() as f64
+    let jumping = (0..asked).map(|k| k * points.len() / asked).filter(jumps).count();
+    jumping as f64 > MOST * asked as f64
 }
 
 #[cfg(test)]

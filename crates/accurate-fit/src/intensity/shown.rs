@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use accurate_geom::nalgebra::Vector2;
 use accurate_geom::{Curve3, Point2};
 
@@ -61,24 +63,30 @@ impl IntensityPair {
         let start = Start::new(curve, &self.projectors, &self.params)?;
         let (mut scale, mut darkest) = ([0.0; 2], [0.0; 2]);
         for view in 0..2 {
-            let band = &self.bands[view];
-            let mut drawn = vec![0.0; band.depth.len()];
-            let brush = (&self.projectors[view], BLUR_PX);
-            each_darkness(
-                &start.spline,
-                start.samples,
-                0..start.samples,
-                brush,
-                band,
-                |_, n, d| {
-                    drawn[n] += d;
-                },
-            );
-            scale[view] = amplitude(&drawn, &band.depth)
+            let drawn = self.drawn(&start, 0..start.samples, view, 1.0);
+            scale[view] = amplitude(&drawn, &self.bands[view].depth)
                 .ok_or(FitError::NotSeenInImage { view: view as u8 + 1 })?;
             darkest[view] = scale[view] * drawn.iter().copied().fold(0.0, f64::max);
         }
         Ok(CurveEnds { pair: self, start, scale, darkest })
+    }
+
+    /// What some pieces of a curve draw into the band of a view.
+    fn drawn(&self, curve: &Start, pieces: Range<usize>, view: usize, scale: f64) -> Vec<f64> {
+        let mut drawn = vec![0.0; self.bands[view].depth.len()];
+        self.each_darkness(curve, pieces, view, |_, n, d| drawn[n] += scale * d);
+        drawn
+    }
+
+    fn each_darkness(
+        &self,
+        curve: &Start,
+        pieces: Range<usize>,
+        view: usize,
+        visit: impl FnMut(usize, usize, f64),
+    ) {
+        let brush = (&self.projectors[view], BLUR_PX);
+        each_darkness(&curve.spline, curve.samples, pieces, brush, &self.bands[view], visit);
     }
 }
 
@@ -120,19 +128,15 @@ impl CurveEnds<'_> {
         let groups = cut.div_ceil(TOGETHER);
         let mut pieces = vec![[Sums::default(); 2]; groups];
         for view in 0..2 {
-            let (band, scale) = (&self.pair.bands[view], self.scale[view]);
-            let brush = (&self.pair.projectors[view], BLUR_PX);
-            let draw = |range| {
-                let mut drawn = vec![0.0; band.depth.len()];
-                each_darkness(spline, samples, range, brush, band, |_, n, d| drawn[n] += scale * d);
-                drawn
-            };
+            let (pair, scale) = (self.pair, self.scale[view]);
+            let depth = &pair.bands[view].depth;
             let most = MOST.max(2.0 * self.darkest[view]);
-            let (by_rest, by_tail) = (draw(rest.clone()), draw(tail.clone()));
-            each_darkness(spline, samples, tail.clone(), brush, band, |k, n, d| {
+            let [by_rest, by_tail] =
+                [&rest, &tail].map(|range| pair.drawn(&self.start, range.clone(), view, scale));
+            pair.each_darkness(&self.start, tail.clone(), view, |k, n, d| {
                 let sums = &mut pieces[group(k)][view];
                 let darkness = scale * d;
-                sums.left += darkness * (band.depth[n] - by_rest[n]).clamp(-most, most);
+                sums.left += darkness * (depth[n] - by_rest[n]).clamp(-most, most);
                 sums.own += darkness * by_tail[n];
                 sums.rest += darkness * by_rest[n];
             });

@@ -3,7 +3,6 @@ use std::path::Path;
 
 use accurate_geom::Camera;
 use accurate_geom::nalgebra::Matrix3x4;
-use ndarray_npy::npy::header::Header;
 
 use super::detect::stem;
 use super::named_view::no_size;
@@ -57,9 +56,7 @@ pub(crate) fn read_npy(
     bytes: &[u8],
     defaults: &ViewDefaults,
 ) -> Result<Vec<NamedView>, IoError> {
-    let malformed = |reason: String| IoError::malformed(path, "NPY", None, reason);
-    let length = crate::npy::check_header(bytes).map_err(malformed)?;
-    let header = Header::from_reader(&mut &bytes[..]).map_err(|e| malformed(e.to_string()))?;
+    let (header, length) = crate::npy::header(path, bytes)?;
     let count = match header.shape[..] {
         [3, 4] => Some(1),
         [n, 3, 4] => Some(n),
@@ -70,7 +67,7 @@ pub(crate) fn read_npy(
     if !plain || header.layout != ndarray_npy::npy::header::Layout::Standard || !fits {
         let reason =
             format!("shape {:?}; expected (3, 4) or (n, 3, 4) of f8, C order", header.shape);
-        return Err(malformed(reason));
+        return Err(IoError::malformed(path, "NPY", None, reason));
     }
     let mut values = Vec::with_capacity(length / 8);
     for (i, chunk) in bytes[bytes.len() - length..].chunks_exact(8).enumerate() {
