@@ -81,6 +81,15 @@ impl CalibrationEstimate {
         Ok(Rig::new(rig.camera1().clone(), camera2, rig.unit())?)
     }
 
+    /// The same of an image that lies otherwise: `axes` takes a direction in this one to that in the other, a
+    /// turn by quarters or its mirror image. The camera's turn about its axis stays what it is.
+    pub fn in_axes(&self, axes: &Matrix2<f64>) -> Self {
+        let shift = axes * Vector2::from(self.shift_px);
+        let mut all = Matrix3::identity();
+        all.fixed_view_mut::<2, 2>(0, 0).copy_from(axes);
+        Self::new(shift.into(), self.roll_rad, all * self.covariance * all.transpose())
+    }
+
     pub(crate) fn new(shift_px: [f64; 2], roll_rad: f64, covariance: Matrix3<f64>) -> Self {
         let shift = Matrix2::new(
             covariance[(0, 0)],

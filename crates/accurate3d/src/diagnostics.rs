@@ -13,8 +13,8 @@ use crate::{CarefulLook, Traces};
 pub struct Diagnostics {
     /// Mean distance in view 1 of matched pixels to their epipolar lines, px. Right orders stay
     /// below about 0.5; a wrong traversal or direction shows as more. By [`Method::Accurate`] on masks
-    /// and images it is that of the two walks that the curve started from: the fitted curve's own is 0,
-    /// for its pixels are projections of one point.
+    /// and images it is that of the two walks that the curve started from, in one of the views: the fitted
+    /// curve's own is 0, for its pixels are projections of one point.
     ///
     /// [`Method::Accurate`]: crate::Method::Accurate
     pub mean_epipolar_distance_px: f64,

@@ -17,7 +17,7 @@ pub struct Explanation {
 pub struct ConsideredCurve {
     /// Index of its walk in each view, cheapest first.
     pub walks: [usize; 2],
-    /// Whether the walk of view 2 was turned round.
+    /// Whether one of the walks was turned round: they run against each other.
     pub reversed: bool,
     /// What the search compares; what is close to the least is fitted once more.
     pub score: f64,

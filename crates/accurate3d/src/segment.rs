@@ -134,7 +134,7 @@ pub(crate) mod tests {
             let pair = segment_images(pair.clone(), &Dark { cut: 0 }, &unwatched).unwrap();
             assert_eq!(pair.masks.as_ref(), Some(&case.masks));
             let mut params = Params::new(InputKind::Image, method);
-            params.robust.by_probability = false;
+            (params.robust.by_probability, params.robust.by_grey_levels) = (false, false);
             let image = reconstruct(&pair, &params).unwrap();
             let masks = ViewPair::from(case.clone());
             let mask = reconstruct(&masks, &Params::new(InputKind::Mask, method)).unwrap();

@@ -67,9 +67,6 @@ impl<V: View> ViewCandidates<V> {
             hints.iter().for_each(|hint| draw(drawn, hint, half_px));
         }
         let (cut, origin) = cut_to_body(&shown);
-        // However a mask lies, the same skeleton is taken of it. (A network sees another image.)
-        let upright = if probability.is_none() { Turn::upright(&cut) } else { Turn::NONE };
-        let turn = upright.then(turn);
         let frame = Frame::new(turn, origin, &cut);
         let mask = Mask::from_array(turn.array(&cut)).map_err(segmentation)?;
         let mut thin = zhang_suen(&mask);
@@ -178,14 +175,15 @@ impl<V: View> ViewCandidates<V> {
             .collect()
     }
 
-    /// What a walk did where it could have gone on otherwise.
-    pub(crate) fn junctions(&self, walk: usize) -> Vec<JunctionDecision> {
-        let way = |half: &HalfEdge| self.way(half);
+    /// What a walk did where it could have gone on otherwise; places in the image that this view's lies
+    /// in as the frame says.
+    pub(crate) fn junctions(&self, walk: usize, given: &Frame) -> Vec<JunctionDecision> {
+        let way = |half: &HalfEdge| self.way(half, given);
         self.walks[walk]
             .decisions
             .iter()
             .filter(|decision| !decision.alternatives.is_empty())
-            .map(|decision| (self.frame.in_image(decision.at), decision))
+            .map(|decision| (given.in_image(self.frame.in_image(decision.at)), decision))
             .map(|(at, decision)| JunctionDecision {
                 at: [at.x, at.y],
                 taken: way(&decision.left_along),
@@ -202,12 +200,12 @@ impl<V: View> ViewCandidates<V> {
     }
 
     /// A half-edge in words: where it has led after a few pixels.
-    fn way(&self, half: &HalfEdge) -> String {
+    fn way(&self, half: &HalfEdge, given: &Frame) -> String {
         const AHEAD: usize = 10;
         let points = &self.graph.edges()[half.edge].points;
         let last = points.len().saturating_sub(1);
         let at = if half.reversed { last.saturating_sub(AHEAD) } else { AHEAD.min(last) };
-        match points.get(at).map(|p| self.frame.in_image(*p)) {
+        match points.get(at).map(|p| given.in_image(self.frame.in_image(*p))) {
             Some(p) => format!("to {:.0}, {:.0}", p.x, p.y),
             None => format!("along edge {}", half.edge),
         }
@@ -290,7 +288,7 @@ fn draw(mask: &mut Array2<bool>, hint: &GapHint, half_px: f64) {
 }
 
 /// The part of the image that shows the body, and its first column and row.
-fn cut_to_body(array: &Array2<bool>) -> (Array2<bool>, [f64; 2]) {
+pub(crate) fn cut_to_body(array: &Array2<bool>) -> (Array2<bool>, [f64; 2]) {
     let (rows, columns) = array.dim();
     let (mut top, mut bottom, mut left, mut right) = (rows, 0, columns, 0);
     for (y, row) in array.rows().into_iter().enumerate() {

@@ -23,7 +23,7 @@ pub struct Evidence {
     /// By how much the likeliest curve that is another one (somewhere more than 5 px away) is less
     /// likely, in twelfths of -2 ln of the probability; none if there is no other.
     pub margin: Option<f64>,
-    /// Mean distance of the pixels of view 1 to their partners' epipolar lines, of the walks that the
+    /// Mean distance of the pixels of one view to their partners' epipolar lines, of the walks that the
     /// curve started from, px.
     pub walks_distance_px: f64,
     /// Part of the less covered skeleton that its walk leaves out.

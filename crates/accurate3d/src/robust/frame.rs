@@ -1,4 +1,5 @@
-use accurate_geom::{Pixel, View};
+use accurate_geom::nalgebra::{Matrix2, Matrix3, Vector2};
+use accurate_geom::{Camera, GeomError, ImageSize, Pixel, View};
 use ndarray::{Array2, ArrayView2, Axis};
 
 /// How an image is turned before its skeleton is taken: flipped, then perhaps transposed.
@@ -24,21 +25,59 @@ impl Turn {
     }
 
     /// The turn that brings an image to the same pixels however it was turned before: of all eight
-    /// turned images the least, row by row.
-    pub(crate) fn upright(image: &Array2<bool>) -> Self {
+    /// turned ones that whose `body`, the part that shows it, is the least, row by row; or the image, where
+    /// the body is symmetric.
+    pub(crate) fn upright(body: &Array2<bool>, image: &Array2<bool>) -> Self {
         let all = (0..8).map(|k| Self::new(k & 1 != 0, k & 2 != 0, k & 4 != 0));
-        let order = |a: &Self, b: &Self| {
-            let [a, b] = [a, b].map(|turn| turn.view(image));
+        let order_of = |array: &Array2<bool>, a: &Self, b: &Self| {
+            let [a, b] = [a, b].map(|turn| turn.view(array));
             a.shape().cmp(b.shape()).then_with(|| a.iter().cmp(b.iter()))
         };
+        let order = |a: &Self, b: &Self| order_of(body, a, b).then_with(|| order_of(image, a, b));
         all.min_by(order).unwrap_or(Self::NONE)
     }
 
-    /// This turn, and then another.
-    pub(crate) const fn then(self, next: Self) -> Self {
-        let (x, y) =
-            if self.transposed { (next.flip_y, next.flip_x) } else { (next.flip_x, next.flip_y) };
-        Self::new(self.flip_x ^ x, self.flip_y ^ y, self.transposed ^ next.transposed)
+    /// The camera whose image is the turned one, with `fy` above 0 and the same optical axis.
+    ///
+    /// # Errors
+    /// [`GeomError`] if that is no camera, which cannot happen to one.
+    pub(crate) fn camera(self, camera: &Camera) -> Result<Camera, GeomError> {
+        let ImageSize { width, height } = camera.size();
+        let (k, axes) = (camera.k(), self.axes());
+        let [w, h] = [width, height].map(|n| f64::from(n) - 1.0);
+        let (cx, cy) = (k[(0, 2)], k[(1, 2)]);
+        let cx = if self.flip_x { w - cx } else { cx };
+        let cy = if self.flip_y { h - cy } else { cy };
+        let (centre, size) = if self.transposed {
+            ([cy, cx], ImageSize { width: height, height: width })
+        } else {
+            ([cx, cy], camera.size())
+        };
+        // A turn about the optical axis makes the focal part triangular again.
+        let focal = axes * k.fixed_view::<2, 2>(0, 0);
+        let last = focal.row(1).transpose();
+        let roll = Matrix2::from_columns(&[Vector2::new(last.y, -last.x), last]) / last.norm();
+        let focal = focal * roll;
+        let k = Matrix3::new(
+            focal[(0, 0)],
+            focal[(0, 1)],
+            centre[0],
+            0.0,
+            focal[(1, 1)],
+            centre[1],
+            0.0,
+            0.0,
+            1.0,
+        );
+        let back = roll.transpose().to_homogeneous();
+        Camera::new(k, back * camera.r(), back * camera.t(), size)
+    }
+
+    /// Where the turned image's directions come from: of one in the image, `[x, y]`, the turned one.
+    pub(crate) fn axes(self) -> Matrix2<f64> {
+        let sign = |flip| if flip { -1.0 } else { 1.0 };
+        let (x, y) = (sign(self.flip_x), sign(self.flip_y));
+        if self.transposed { Matrix2::new(0.0, y, x, 0.0) } else { Matrix2::new(x, 0.0, 0.0, y) }
     }
 
     /// The turned image.
@@ -91,6 +130,11 @@ impl Frame {
         if self.turn.transposed { Pixel::new(y, x) } else { Pixel::new(x, y) }
     }
 
+    /// A direction of the turned part in the image.
+    pub(crate) fn axes_in_image(&self) -> Matrix2<f64> {
+        self.turn.axes().transpose()
+    }
+
     fn flipped(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let Turn { flip_x, flip_y, .. } = self.turn;
         [if flip_x { self.last[0] - x } else { x }, if flip_y { self.last[1] - y } else { y }]
@@ -99,13 +143,20 @@ impl Frame {
 
 #[cfg(test)]
 mod tests {
-    use accurate_geom::View1;
+    use accurate_geom::nalgebra::{Rotation3, Vector3};
+    use accurate_geom::{Point3, View1};
     use ndarray::Slice;
 
     use super::*;
 
     fn every_turn() -> impl Iterator<Item = Turn> + Clone {
         (0..8).map(|k| Turn::new(k & 1 != 0, k & 2 != 0, k & 4 != 0))
+    }
+
+    /// One turn, and then another.
+    fn both(first: Turn, next: Turn) -> Turn {
+        let turned = next.array(&first.array(&image()));
+        every_turn().find(|turn| turn.array(&image()) == turned).unwrap()
     }
 
     fn image() -> Array2<bool> {
@@ -130,22 +181,49 @@ mod tests {
     }
 
     #[test]
-    fn one_turn_after_another_is_both() {
-        let image = image();
-        for first in every_turn() {
-            for next in every_turn() {
-                assert_eq!(first.then(next).array(&image), next.array(&first.array(&image)));
+    fn a_turned_camera_sees_a_point_where_the_turned_image_shows_it() {
+        let k = Matrix3::new(900.0, 7.0, 250.0, 0.0, 1100.0, 300.0, 0.0, 0.0, 1.0);
+        let r = Rotation3::from_euler_angles(0.2, -0.3, 0.5).into_inner();
+        let size = ImageSize { width: 640, height: 480 };
+        let camera = Camera::new(k, r, Vector3::new(3.0, -5.0, 800.0), size).unwrap();
+        let image = Array2::from_elem((480, 640), false);
+        for turn in every_turn() {
+            let turned = turn.camera(&camera).unwrap();
+            let frame = Frame::new(turn, [0.0; 2], &image);
+            assert!(turned.k()[(1, 1)] > 0.0, "{turn:?}");
+            for x in [-80.0, 0.0, 35.0] {
+                let point = Point3::new(x, 40.0 - x, 0.5 * x);
+                let seen = turned.project(&point).unwrap();
+                let back = frame.in_image(Pixel::<View1>::new(seen.x, seen.y));
+                let expected = camera.project(&point).unwrap();
+                let off = (back.x - expected.x).hypot(back.y - expected.y);
+                assert!(off < 1e-9, "{turn:?} {off}");
+                assert!((turned.depth(&point) - camera.depth(&point)).abs() < 1e-9);
             }
+            // A camera that was turned before comes out the same to the last bits.
+            for before in every_turn() {
+                let twice = turn.camera(&before.camera(&camera).unwrap()).unwrap();
+                let once = both(before, turn).camera(&camera).unwrap();
+                assert!((twice.k() - once.k()).amax() < 1e-9, "{before:?} {turn:?}");
+                assert!((twice.r() - once.r()).amax() < 1e-14, "{before:?} {turn:?}");
+            }
+            let direction = frame.axes_in_image() * Vector2::new(1.0, 0.0);
+            let [a, b] = [0.0, 1.0].map(|x| frame.in_image(Pixel::<View1>::new(x, 0.0)));
+            assert_eq!([direction.x, direction.y], [b.x - a.x, b.y - a.y], "{turn:?}");
         }
     }
 
     #[test]
     fn upright_is_the_same_however_an_image_was_turned() {
         let image = image();
-        let upright = Turn::upright(&image).array(&image);
-        for turn in every_turn() {
-            let turned = turn.array(&image);
-            assert_eq!(Turn::upright(&turned).array(&turned), upright, "{turn:?}");
+        let symmetric = Array2::from_elem((4, 4), true);
+        for body in [&image, &symmetric] {
+            let upright = Turn::upright(body, &image).array(&image);
+            for turn in every_turn() {
+                let turned = turn.array(&image);
+                let again = Turn::upright(&turn.array(body), &turned).array(&turned);
+                assert_eq!(again, upright, "{turn:?}");
+            }
         }
     }
 }

@@ -10,6 +10,7 @@ use super::grey_levels::{choose_by_grey_levels, on_grey_levels};
 use super::hairpins::{DOUBLED, KINKS};
 use super::look::{Look, Seen};
 use super::suspicion::{DoubtLimits, Suspicion, calls_for_the_pictures};
+use super::upright::Upright;
 use crate::{Closure, Error, Explanation, IntensityDiagnostics};
 
 /// How hard the joint choice looks.
@@ -144,7 +145,7 @@ pub(crate) struct JointResult {
     pub(crate) walk1: Vec<Pixel<View1>>,
     pub(crate) walk2: Vec<Pixel<View2>>,
     pub(crate) coverage: [f64; 2],
-    /// Mean distance of the chosen walks' pixels of view 1 to their partners' epipolar lines, px.
+    /// Mean distance of the chosen walks' pixels of one view to their partners' epipolar lines, px.
     pub(crate) mean_distance_px: f64,
     pub(crate) fits: usize,
     /// What the curve says about the calibration of view 2, if asked.
@@ -175,7 +176,14 @@ pub(crate) fn reconstruct_masks(
     closure: Closure,
     case: &str,
 ) -> Result<JointResult, Error> {
-    let look = |turn| Look { masks, probabilities, rig, params, closure, turn, case }.look();
+    let upright = match (probabilities, images) {
+        (None, None) => Upright::of(masks, rig, params.calibration.is_none(), case)?,
+        _ => Upright::as_given(masks, rig),
+    };
+    let look = |turn| {
+        let (masks, rig) = (&*upright.masks, &*upright.rig);
+        Look { masks, probabilities, rig, params, closure, turn, case }.look()
+    };
     let [limits, to_look_on] = match (probabilities, &params.calibration) {
         (Some(_), _) => [&DoubtLimits::MAPS; 2],
         (None, None) => [&DoubtLimits::MASKS, &DoubtLimits::MASKS_TO_LOOK_ON],
@@ -196,13 +204,13 @@ pub(crate) fn reconstruct_masks(
             seen = seen.beside(other);
         }
     }
-    let Some(images) = images else { return Ok(seen.into_result(limits)) };
+    let Some(images) = images else { return Ok(seen.into_result(limits, &upright)) };
     let overruled_by = if calls_for_the_pictures(&seen.evidence()) {
         choose_by_grey_levels(&mut seen, images, rig, params)
     } else {
         None
     };
-    let mut result = seen.into_result(limits);
+    let mut result = seen.into_result(limits, &upright);
     result.grey_levels =
         Some(on_grey_levels(&mut result, images, probabilities, rig, params, overruled_by));
     Ok(result)

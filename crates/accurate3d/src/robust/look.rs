@@ -1,16 +1,18 @@
 use accurate_fit::{CalibrationEstimate, OutlinePair};
-use accurate_geom::{Pixel, Rig, View1, View2};
+use accurate_geom::{Pixel, Point2, Rig, View, View1, View2};
+use accurate_traverse::Walk;
 use ndarray::Array2;
 
 use super::RobustParams;
 use super::candidates::ViewCandidates;
 use super::choice::{RIVAL_PX, Settled, choose, choose_ring, contenders};
 use super::evidence::Evidence;
-use super::frame::Turn;
+use super::frame::{Frame, Turn};
 use super::joint::JointResult;
 use super::score::Candidate;
 use super::search::{Effort, Search};
 use super::suspicion::{DoubtLimits, calls_for_a_second_look};
+use super::upright::Upright;
 use crate::{Closure, Error, Explanation};
 
 /// What a look at the images takes.
@@ -126,27 +128,40 @@ impl Seen {
         self.others.iter().filter(move |other| !other.shape.is_like(best, RIVAL_PX))
     }
 
-    pub(crate) fn into_result(self, limits: &DoubtLimits) -> JointResult {
+    /// In the images as they were given.
+    pub(crate) fn into_result(self, limits: &DoubtLimits, upright: &Upright<'_>) -> JointResult {
         let evidence = self.evidence();
         let Settled { choice, fits, .. } = &self.settled;
         let rivals = choice.finalists[fits.len()..].iter().chain(self.rivals());
-        let candidates = fits.iter().chain(rivals).map(Candidate::considered).collect();
+        let mut candidates: Vec<_> = fits.iter().chain(rivals).map(Candidate::considered).collect();
         let Self { view1, view2, settled, fits: tried, .. } = self;
         let Settled { mut fits, mut calibrations, .. } = settled;
         let best = fits.swap_remove(0);
         let [i, j] = best.walks;
-        let coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
-        let explanation =
-            Explanation { candidates, junctions: [view1.junctions(i), view2.junctions(j)] };
+        let mut coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
+        let [frame1, frame2] = &upright.frames;
+        let mut junctions = [view1.junctions(i, frame1), view2.junctions(j, frame2)];
+        let mut walk1: Vec<_> = in_given(&view1.walks[i], frame1);
+        let mut walk2: Vec<_> = in_given(&view2.walks[j], frame2);
+        if best.reversed {
+            walk2.reverse();
+        }
+        if upright.swapped {
+            candidates.iter_mut().for_each(|curve| curve.walks.reverse());
+            coverage.reverse();
+            junctions.reverse();
+            std::mem::swap(&mut walk1, &mut walk2);
+        }
+        let calibration = calibrations.swap_remove(0);
         JointResult {
             grey_levels: None,
-            explanation,
-            walk1: view1.walks[i].points.clone(),
-            walk2: directed(&view2.walks[j].points, best.reversed),
+            explanation: Explanation { candidates, junctions },
+            walk1: walk1.into_iter().map(Pixel::from).collect(),
+            walk2: walk2.into_iter().map(Pixel::from).collect(),
             coverage,
             mean_distance_px: best.mean_distance_px,
             fits: tried,
-            calibration: calibrations.swap_remove(0),
+            calibration: calibration.map(|found| upright.given_calibration(&found)),
             suspicions: evidence.suspicions(limits),
             evidence,
             fit: best.fit,
@@ -155,9 +170,7 @@ impl Seen {
 }
 
 /// The bridges twice as wide as they come: what hides the body hides how it bends there.
-fn corridors<V: accurate_geom::View>(
-    bridges: &[(Pixel<V>, Pixel<V>)],
-) -> Vec<(Pixel<V>, Pixel<V>)> {
+fn corridors<V: View>(bridges: &[(Pixel<V>, Pixel<V>)]) -> Vec<(Pixel<V>, Pixel<V>)> {
     const ASIDE_PX: f64 = 4.0;
     const LONGEST_PX: f64 = 30.0;
     let mut all = bridges.to_vec();
@@ -174,6 +187,6 @@ fn corridors<V: accurate_geom::View>(
     all
 }
 
-fn directed(points: &[Pixel<View2>], reversed: bool) -> Vec<Pixel<View2>> {
-    if reversed { points.iter().rev().copied().collect() } else { points.to_vec() }
+fn in_given<V: View>(walk: &Walk<V>, frame: &Frame) -> Vec<Point2> {
+    walk.points.iter().map(|p| frame.in_image(*p).point()).collect()
 }

@@ -26,14 +26,16 @@ mod start;
 mod strays;
 mod suspicion;
 mod tails;
+mod upright;
 
 pub(crate) use candidates::ViewCandidates;
 pub use evidence::Evidence;
 pub(crate) use finalists::SAME_PX;
-pub(crate) use frame::Turn;
+pub(crate) use frame::{Frame, Turn};
 pub(crate) use joint::{JointResult, reconstruct_masks};
 pub use joint::{RobustParams, SecondLook};
 pub(crate) use shape::px_per_unit;
 pub(crate) use strays::without_strays;
 pub(crate) use suspicion::calls_for_a_careful_look;
 pub use suspicion::{DoubtLimits, Suspicion};
+pub(crate) use upright::upright_turn;
