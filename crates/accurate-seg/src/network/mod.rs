@@ -8,6 +8,10 @@
 //! - [`NnunetFolder`]: the parts of a folder of nnU-Net's results, as a bundle.
 
 mod bundle;
+#[cfg(feature = "rten")]
+mod convolution;
+#[cfg(feature = "rten")]
+mod convolution_plan;
 mod engine;
 mod manifest;
 mod model_error;

@@ -3,23 +3,43 @@ use std::sync::Arc;
 use std::thread::{self, ScopedJoinHandle};
 
 use ndarray::{Array2, Array3};
-use rten::{Model, ModelOptions, NodeId, RunOptions, ThreadPool};
-use rten_tensor::NdTensorView;
+use prost::Message;
+use rten::{Model, ModelOptions, NodeId, RunOptions, ThreadPool, ValueOrView};
+use rten_tensor::Tensor;
 use rten_tensor::prelude::*;
 
+use super::convolution::Convolution;
+use super::convolution_plan::{PlannedConvolution, needs, plan};
+use super::onnx_proto::ModelProto;
 use super::{Engine, ModelBundle, ModelError};
 use crate::SegError;
 
 const NAME: &str = "rten 0.27";
 
 /// The engine in pure Rust: nothing to install.
+///
+/// rten runs the network but for its convolutions: it gathers their pixels one by one, which takes twice as
+/// long as the rest. They are matrix products of faer.
 pub struct RtenEngine {
     model: Model,
-    input: NodeId,
-    output: NodeId,
+    /// The image and what each of the convolutions makes, in order.
+    known: Vec<NodeId>,
+    /// The convolutions, each with what it takes.
+    convolutions: Vec<(Convolution, Vec<Target>)>,
+    output: Target,
     threads: usize,
     pool: Arc<ThreadPool>,
 }
+
+/// A value that rten is asked for.
+struct Target {
+    node: NodeId,
+    /// Which of the known values are enough for it, and whether nothing later takes them.
+    needs: Vec<(usize, bool)>,
+}
+
+/// The known values that something still takes.
+type Values = Vec<Option<Tensor<f32>>>;
 
 impl RtenEngine {
     /// Prepares the network of a bundle for `threads` threads, at least 1.
@@ -28,49 +48,150 @@ impl RtenEngine {
     /// [`ModelError::Engine`].
     ///
     /// # Cost
-    /// The weights are held in float32, once.
+    /// The weights are held in float32, twice.
     pub fn new(bundle: &ModelBundle, threads: usize) -> Result<Self, ModelError> {
         let refuse = |message: String| ModelError::Engine { engine: NAME, message };
         let model = ModelOptions::with_all_ops()
             .load(bundle.network().to_vec())
             .map_err(|error| refuse(error.to_string()))?;
+        let graph = ModelProto::decode(bundle.network().clone())
+            .map_err(|error| ModelError::NotOnnx { message: error.to_string() })?
+            .graph
+            .unwrap_or_default();
         let spec = &bundle.manifest().network;
         let node = |name: &str| model.node_id(name).map_err(|error| refuse(error.to_string()));
-        let (input, output) = (node(&spec.input)?, node(&spec.output)?);
+
+        let mut known = vec![spec.input.as_str()];
+        let mut names = Vec::new();
+        let mut prepared_ones = Vec::new();
+        let planned = plan(&graph);
+        for planned in &planned {
+            // What rten has made something else of stays with it.
+            if let Some(convolution) = prepared(&model, planned) {
+                known.push(&planned.output);
+                names.extend(planned.inputs.iter().map(String::as_str));
+                prepared_ones.push((convolution, planned.inputs.len()));
+            }
+        }
+        names.push(&spec.output);
+        let mut targets = Vec::new();
+        for (name, needs) in names.iter().zip(needs(&graph, &known, &names)) {
+            targets.push(Target { node: node(name)?, needs });
+        }
+        let known = known.into_iter().map(node).collect::<Result<_, _>>()?;
+        let mut targets = targets.into_iter();
+        let convolutions = prepared_ones
+            .into_iter()
+            .map(|(convolution, inputs)| (convolution, targets.by_ref().take(inputs).collect()))
+            .collect();
+        let output = targets.next().ok_or_else(|| refuse("it has no output".to_owned()))?;
         let threads = threads.max(1);
         let pool = Arc::new(ThreadPool::with_num_threads(threads));
-        Ok(Self { model, input, output, threads, pool })
+        Ok(Self { model, known, convolutions, output, threads, pool })
     }
+
+    fn run(&self, image: Tensor<f32>) -> Result<Tensor<f32>, String> {
+        let mut values = vec![Some(image)];
+        for (convolution, targets) in &self.convolutions {
+            let inputs = targets
+                .iter()
+                .map(|target| self.value(target, &mut values))
+                .collect::<Result<Vec<_>, _>>()?;
+            values.push(Some(self.convolved(convolution, &inputs)?));
+        }
+        self.value(&self.output, &mut values)
+    }
+
+    fn convolved(
+        &self,
+        convolution: &Convolution,
+        inputs: &[Tensor<f32>],
+    ) -> Result<Tensor<f32>, String> {
+        let shapes: Vec<_> = inputs.iter().map(|input| input.shape().to_vec()).collect();
+        let images: Option<Vec<_>> = inputs.iter().map(Tensor::data).collect();
+        let sides = shapes[0].get(2..4).map(|sides| [sides[0], sides[1]]);
+        let (Some(images), Some(sides)) = (images, sides) else {
+            return Err(format!("a convolution of values of shape {shapes:?}"));
+        };
+        let channels: usize = shapes.iter().map(|shape| shape[1]).sum();
+        let alike = shapes.iter().all(|shape| shape[..] == [1, shape[1], sides[0], sides[1]]);
+        if !alike || channels != convolution.inputs() || sides.contains(&0) {
+            return Err(format!("a convolution of values of shape {shapes:?}"));
+        }
+        let (output, [rows, columns]) = self.pool.run(|| convolution.apply(&images, sides));
+        let channels = output.len() / (rows * columns);
+        Ok(Tensor::from_data(&[1, channels, rows, columns], output))
+    }
+
+    /// By rten. Known values that nothing later takes are given up for it.
+    fn value(&self, target: &Target, values: &mut Values) -> Result<Tensor<f32>, String> {
+        let given: Vec<_> = target
+            .needs
+            .iter()
+            .map(|&(k, is_last)| if is_last { values[k].take() } else { None })
+            .collect();
+        let mut inputs: Vec<(NodeId, ValueOrView<'_>)> = Vec::new();
+        for (given, &(k, _)) in given.into_iter().zip(&target.needs) {
+            let is_target = self.known[k] == target.node;
+            match (given, &values[k]) {
+                (Some(value), _) if is_target => return Ok(value),
+                (None, Some(value)) if is_target => return Ok(value.clone()),
+                (Some(value), _) => inputs.push((self.known[k], value.into())),
+                (None, Some(value)) => inputs.push((self.known[k], value.into())),
+                (None, None) => return Err(format!("value {k} is gone")),
+            }
+        }
+        let options = RunOptions::default().with_thread_pool(Some(self.pool.clone()));
+        let [output] = self
+            .model
+            .run_n(inputs, [target.node], Some(options))
+            .map_err(|error| error.to_string())?;
+        output.into_tensor::<f32>().ok_or_else(|| "a value is not float32".to_owned())
+    }
+}
+
+/// A convolution with its tensors as rten has them.
+fn prepared(model: &Model, planned: &PlannedConvolution) -> Option<Convolution> {
+    let tensor = |name: &str| {
+        let [value] = model.run_n(Vec::new(), [model.node_id(name).ok()?], None).ok()?;
+        value.into_tensor::<f32>()
+    };
+    let mut names = planned.inputs.iter().chain([&planned.output]);
+    if !names.all(|name| model.node_id(name).is_ok()) {
+        return None;
+    }
+    let weights = tensor(&planned.weights)?;
+    let bias = match &planned.bias {
+        Some(name) => Some(tensor(name)?.into_data()),
+        None => None,
+    };
+    let &[outputs, inputs, side, _] = weights.shape() else { return None };
+    let shape = [outputs, inputs, side];
+    Convolution::new(&weights.into_data(), bias.as_deref(), shape, planned.stride)
 }
 
 impl Engine for RtenEngine {
     fn logits(&self, input: &Array2<f32>) -> Result<Array3<f32>, SegError> {
         let refuse = |message: String| SegError::Engine { engine: self.describe(), message };
         let (height, width) = input.dim();
-        let data = input.as_standard_layout();
-        let pixels = data.as_slice().unwrap_or_default();
-        let view = NdTensorView::from_data([1, 1, height, width], pixels);
-        let options = RunOptions::default().with_thread_pool(Some(self.pool.clone()));
-        let run =
-            || self.model.run_n(vec![(self.input, view.into())], [self.output], Some(options));
+        let image =
+            Tensor::from_data(&[1, 1, height, width], input.iter().copied().collect::<Vec<_>>());
         // On a thread of its own, which only waits: a worker of the caller's pool would begin other
         // work of its pool meanwhile, the next image, and the next within that one.
         let ran = thread::scope(|scope| {
-            thread::Builder::new().spawn_scoped(scope, run).map(ScopedJoinHandle::join)
+            thread::Builder::new()
+                .spawn_scoped(scope, || self.run(image))
+                .map(ScopedJoinHandle::join)
         });
-        let [output] = ran
+        let output = ran
             .map_err(|error| refuse(format!("no thread for it: {error}")))?
             .map_err(|_| refuse("it panicked".to_owned()))?
-            .map_err(|error| refuse(error.to_string()))?;
+            .map_err(refuse)?;
         let shape = output.shape().to_vec();
-        let data: Vec<f32> = output
-            .into_tensor::<f32>()
-            .ok_or_else(|| refuse("its output is not float32".to_owned()))?
-            .into_data();
         let [1, classes, rows, columns] = shape[..] else {
             return Err(refuse(format!("output of shape {shape:?}")));
         };
-        Array3::from_shape_vec((classes, rows, columns), data)
+        Array3::from_shape_vec((classes, rows, columns), output.into_data())
             .map_err(|error| refuse(error.to_string()))
     }
 

@@ -1,0 +1,100 @@
+use std::collections::{HashMap, HashSet};
+
+use super::onnx_proto::{GraphProto, NodeProto};
+
+/// A convolution of a network that [`Convolution`](super::convolution::Convolution) can compute.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct PlannedConvolution {
+    /// Names of the values that it takes, one after another: two where a network leads a skip in.
+    pub(super) inputs: Vec<String>,
+    /// Name of the value that it makes.
+    pub(super) output: String,
+    /// Names of its tensors as they are stored: in half precision, if they are cast.
+    pub(super) weights: String,
+    pub(super) bias: Option<String>,
+    pub(super) stride: usize,
+}
+
+/// The convolutions of `graph` that can be computed by themselves, in the order in which they can be: with as
+/// much padding as keeps the middle of a square kernel in the image, all channels together.
+pub(super) fn plan(graph: &GraphProto) -> Vec<PlannedConvolution> {
+    graph.node.iter().filter_map(|node| planned(graph, node)).collect()
+}
+
+/// Of each value in `targets`, which of the values in `known` it is computed from, with nothing known in
+/// between, and whether no later target is.
+pub(super) fn needs(
+    graph: &GraphProto,
+    known: &[&str],
+    targets: &[&str],
+) -> Vec<Vec<(usize, bool)>> {
+    let makers: HashMap<&str, &NodeProto> =
+        graph.node.iter().flat_map(|n| n.output.iter().map(move |o| (o.as_str(), n))).collect();
+    let index: HashMap<&str, usize> = known.iter().enumerate().map(|(k, n)| (*n, k)).collect();
+    let of = |target: &&str| {
+        let (mut found, mut seen, mut open) = (Vec::new(), HashSet::new(), vec![*target]);
+        while let Some(name) = open.pop() {
+            if !seen.insert(name) {
+                continue;
+            }
+            match (index.get(name), makers.get(name)) {
+                (Some(k), _) => found.push(*k),
+                (None, Some(node)) => open.extend(node.input.iter().map(String::as_str)),
+                (None, None) => {}
+            }
+        }
+        found.sort_unstable();
+        found
+    };
+    let mut taken = HashSet::new();
+    let mut needs: Vec<Vec<_>> = Vec::new();
+    for target in targets.iter().rev() {
+        needs.push(of(target).into_iter().map(|k| (k, taken.insert(k))).collect());
+    }
+    needs.reverse();
+    needs
+}
+
+fn planned(graph: &GraphProto, node: &NodeProto) -> Option<PlannedConvolution> {
+    if node.op_type != "Conv" {
+        return None;
+    }
+    let ints = |name: &str| node.attribute.iter().find(|a| a.name == name).map(|a| &a.ints[..]);
+    let all = |name: &str, value: i64| ints(name).is_none_or(|n| n.iter().all(|v| *v == value));
+    let group = node.attribute.iter().find(|a| a.name == "group").map_or(1, |a| a.i);
+    let &[side, other] = ints("kernel_shape")? else { return None };
+    let is_middle = side == other && side % 2 == 1 && all("pads", side / 2);
+    let padded = side == 1 || ints("pads").is_some();
+    let stride = ints("strides").map_or(1, |n| n.first().copied().unwrap_or(1));
+    let alike = all("strides", stride) && all("dilations", 1) && group == 1;
+    let [input, weights, bias @ ..] = node.input.as_slice() else { return None };
+    let [output] = node.output.as_slice() else { return None };
+    (is_middle && padded && alike).then_some(PlannedConvolution {
+        inputs: joined(graph, input),
+        output: output.clone(),
+        weights: stored(graph, weights).to_owned(),
+        bias: bias.first().map(|name| stored(graph, name).to_owned()),
+        stride: usize::try_from(stride).ok()?,
+    })
+}
+
+/// The values that are concatenated along their channels to one, or the one.
+fn joined(graph: &GraphProto, name: &str) -> Vec<String> {
+    let is_channels = |node: &NodeProto| {
+        node.attribute.iter().any(|a| a.name == "axis" && (a.i == 1 || a.i == -3))
+    };
+    match maker(graph, name) {
+        Some(node) if node.op_type == "Concat" && is_channels(node) => node.input.clone(),
+        _ => vec![name.to_owned()],
+    }
+}
+
+/// The tensor that a weight is cast from, or the weight.
+fn stored<'g>(graph: &'g GraphProto, name: &'g str) -> &'g str {
+    let cast = maker(graph, name).filter(|node| node.op_type == "Cast");
+    cast.and_then(|node| node.input.first()).map_or(name, String::as_str)
+}
+
+fn maker<'g>(graph: &'g GraphProto, name: &str) -> Option<&'g NodeProto> {
+    graph.node.iter().find(|node| node.output.iter().any(|output| output == name))
+}
