@@ -98,3 +98,83 @@ fn stored<'g>(graph: &'g GraphProto, name: &'g str) -> &'g str {
 fn maker<'g>(graph: &'g GraphProto, name: &str) -> Option<&'g NodeProto> {
     graph.node.iter().find(|node| node.output.iter().any(|output| output == name))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::onnx_proto::AttributeProto;
+    use super::*;
+
+    fn node(kind: &str, inputs: &[&str], output: &str, attributes: &[(&str, &[i64])]) -> NodeProto {
+        let owned = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect();
+        let attribute = |(name, ints): &(&str, &[i64])| AttributeProto {
+            name: (*name).to_owned(),
+            i: ints[0],
+            ints: ints.to_vec(),
+            ..AttributeProto::default()
+        };
+        NodeProto {
+            op_type: kind.to_owned(),
+            input: owned(inputs),
+            output: owned(&[output]),
+            attribute: attributes.iter().map(attribute).collect(),
+            ..NodeProto::default()
+        }
+    }
+
+    const MIDDLE: [(&str, &[i64]); 2] = [("kernel_shape", &[3, 3]), ("pads", &[1, 1, 1, 1])];
+
+    fn graph() -> GraphProto {
+        let node = vec![
+            node("Cast", &["half"], "w", &[("to", &[1])]),
+            node("Conv", &["image", "w", "b"], "one", &MIDDLE),
+            node("Relu", &["one"], "skip", &[]),
+            node("Conv", &["skip", "v"], "two", &MIDDLE),
+            node("Concat", &["two", "skip"], "both", &[("axis", &[1])]),
+            node("Conv", &["both", "u"], "three", &MIDDLE),
+        ];
+        GraphProto { node, ..GraphProto::default() }
+    }
+
+    #[test]
+    fn tensors_are_named_as_stored_and_concatenated_inputs_one_by_one() {
+        let planned = plan(&graph());
+        assert_eq!(planned.len(), 3);
+        assert_eq!((planned[0].weights.as_str(), planned[0].bias.as_deref()), ("half", Some("b")));
+        assert_eq!((planned[1].weights.as_str(), planned[1].bias.as_deref()), ("v", None));
+        assert_eq!(planned[2].inputs, ["two", "skip"]);
+        assert!(planned.iter().all(|planned| planned.stride == 1));
+    }
+
+    #[test]
+    fn what_a_value_needs_is_the_nearest_known_and_the_last_to_take_it_is_told() {
+        let known = ["image", "one", "two", "three"];
+        let found = needs(&graph(), &known, &["image", "skip", "two", "skip", "three"]);
+        let expected =
+            [vec![(0, true)], vec![(1, false)], vec![(2, true)], vec![(1, true)], vec![(3, true)]];
+        assert_eq!(found, expected);
+        // With nothing else known all comes from the image.
+        assert_eq!(needs(&graph(), &known[..1], &["three"]), [[(0, true)]]);
+    }
+
+    #[test]
+    fn other_convolutions_are_left_alone() {
+        let others: [&[(&str, &[i64])]; 7] = [
+            &[("kernel_shape", &[3, 3])],
+            &[("kernel_shape", &[3, 3]), ("pads", &[1, 1, 1, 0])],
+            &[("kernel_shape", &[3, 1]), ("pads", &[1, 1, 1, 1])],
+            &[("kernel_shape", &[2, 2]), ("pads", &[1, 1, 1, 1])],
+            &[MIDDLE[0], MIDDLE[1], ("strides", &[2, 1])],
+            &[MIDDLE[0], MIDDLE[1], ("dilations", &[2, 2])],
+            &[MIDDLE[0], MIDDLE[1], ("group", &[2])],
+        ];
+        for attributes in others {
+            let node = vec![node("Conv", &["image", "w"], "out", attributes)];
+            assert_eq!(plan(&GraphProto { node, ..GraphProto::default() }), [], "{attributes:?}");
+        }
+        let one = node("Conv", &["image", "w"], "out", &[("kernel_shape", &[1, 1])]);
+        let strided = [MIDDLE[0], MIDDLE[1], ("strides", &[2, 2])];
+        let two = node("Conv", &["image", "w"], "out", &strided);
+        let planned = plan(&GraphProto { node: vec![one, two], ..GraphProto::default() });
+        assert_eq!(planned.iter().map(|p| p.stride).collect::<Vec<_>>(), [1, 2]);
+    }
+}

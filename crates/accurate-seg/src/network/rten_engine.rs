@@ -205,3 +205,54 @@ impl fmt::Debug for RtenEngine {
         f.debug_struct("RtenEngine").field("threads", &self.threads).finish_non_exhaustive()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What rten would compute instead takes twice as long and says nothing.
+    #[test]
+    fn all_convolutions_of_the_built_in_network_are_matrix_products_and_skips_are_not_copied() {
+        let bundle = include_bytes!("../../../../models/wire.accmodel");
+        let bundle = ModelBundle::read(bundle.as_slice().into()).unwrap();
+        let engine = RtenEngine::new(&bundle, 1).unwrap();
+        let graph = ModelProto::decode(bundle.network().clone()).unwrap().graph.unwrap();
+        let count = |kind: &str| graph.node.iter().filter(|node| node.op_type == kind).count();
+        assert_eq!(engine.convolutions.len(), count("Conv"));
+        let of_two = engine.convolutions.iter().filter(|(_, inputs)| inputs.len() == 2).count();
+        assert_eq!(of_two, count("Concat"));
+        // Values are given up: only the last one that takes each is told so.
+        let targets = engine.convolutions.iter().flat_map(|(_, inputs)| inputs);
+        let all: Vec<_> = targets.chain([&engine.output]).flat_map(|t| &t.needs).collect();
+        for k in 0..engine.known.len() {
+            let uses: Vec<_> =
+                all.iter().filter(|(of, _)| *of == k).map(|(_, last)| last).collect();
+            assert!(!uses.is_empty() && uses.iter().filter(|last| ***last).count() == 1, "{k}");
+            assert!(*uses[uses.len() - 1], "{k}");
+        }
+    }
+
+    /// Two ways of summing 2,304 products at most round differently, and thirty layers hand it on.
+    const ROUNDING: f32 = 1e-3;
+
+    #[test]
+    fn it_gives_what_rten_alone_does() {
+        let bundle = include_bytes!("../../../../models/wire.accmodel");
+        let bundle = ModelBundle::read(bundle.as_slice().into()).unwrap();
+        let engine = RtenEngine::new(&bundle, 2).unwrap();
+        let mut alone = RtenEngine::new(&bundle, 2).unwrap();
+        alone.known.truncate(1);
+        alone.convolutions.clear();
+        alone.output.needs = vec![(0, true)];
+        let body = |y: f32, x: f32| {
+            if (y - 100.0 - 40.0 * (x / 50.0).sin()).abs() < 1.5 { -3.0 } else { 0.0 }
+        };
+        let noise = |y: usize, x: usize| ((31 * y + 17 * x) % 23) as f32 / 23.0;
+        let image =
+            Array2::from_shape_fn((256, 512), |(y, x)| body(y as f32, x as f32) + noise(y, x));
+        let [found, expected] = [&engine, &alone].map(|engine| engine.logits(&image).unwrap());
+        let largest = expected.iter().fold(0.0_f32, |most, v| most.max(v.abs()));
+        let off = found.iter().zip(&expected).fold(0.0_f32, |most, (a, b)| most.max((a - b).abs()));
+        assert!(largest > 5.0 && off < ROUNDING * largest, "{off} of {largest}");
+    }
+}
