@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use accurate3d::Error;
 use accurate3d::eval::EvalError;
 use accurate3d::io::IoError;
+use accurate3d::matching::MatchError;
 use accurate3d::seg::SegError;
 use accurate3d::synth::SynthError;
 use accurate3d::traverse::TraverseError;
@@ -109,6 +110,8 @@ impl fmt::Display for Failure {
 
 const LOOK_AT_THE_MASK: &str =
     "look at the mask: the body should be non-zero and at least 2 px long";
+const LOOK_AT_THE_IMAGE: &str =
+    "look at the image: it shows nothing. Is it the right file, and was it exposed?";
 
 /// Whether a file is one that a pair folder holds.
 fn is_of_a_pair(path: &Path) -> bool {
@@ -183,6 +186,12 @@ impl From<Error> for Failure {
             Error::MissingInput { .. } => Self::new(Self::NO_INPUT, message),
             Error::Segmentation { source, .. } => Self::from(source).about(message),
             Error::Traversal { source, .. } => Self::from(source).about(message),
+            Error::Matching {
+                source: MatchError::TooLarge { .. } | MatchError::OutOfMemory { .. },
+                ..
+            } => {
+                Self::new(Code::TooLarge, message).with_hint("points some 0.5 px apart are enough")
+            }
             Error::Matching { .. } => Self::new(Code::NoMatch, message).with_hint(ASK_THE_DOCTOR),
             Error::NotClosed { .. } => Self::new(Code::NoOrder, message)
                 .with_hint("leave --closed out for a body with two ends"),
@@ -230,7 +239,11 @@ impl From<SegError> for Failure {
     fn from(error: SegError) -> Self {
         let code = code_of(&error);
         let failure = Self::new(code, error.to_string());
-        if code == Code::BadMask { failure.with_hint(LOOK_AT_THE_MASK) } else { failure }
+        match error {
+            SegError::Constant { .. } => failure.with_hint(LOOK_AT_THE_IMAGE),
+            _ if code == Code::BadMask => failure.with_hint(LOOK_AT_THE_MASK),
+            _ => failure,
+        }
     }
 }
 

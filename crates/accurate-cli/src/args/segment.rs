@@ -58,12 +58,21 @@ pub struct SegmentArgs {
     pub out: PathBuf,
     /// Probability above which a pixel begins the body, 0 to 1 (default: the model's own). Weaker
     /// pixels down to 0.6 of it are taken where they hang together with such a one.
-    #[arg(long, value_name = "P")]
+    #[arg(long, value_name = "P", value_parser = probability)]
     pub threshold: Option<f32>,
     #[command(flatten)]
     pub grey: GreyArgs,
     #[command(flatten)]
     pub model: ModelArgs,
+}
+
+fn probability(text: &str) -> Result<f32, String> {
+    let value: f32 = text.parse().map_err(|_| "expected a number from 0 to 1".to_owned())?;
+    if (0.0..=1.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err("expected a number from 0 to 1".to_owned())
+    }
 }
 
 #[derive(Debug, Subcommand)]

@@ -372,3 +372,22 @@ fn one_pixel_is_no_body_to_trace() {
         assert!(said.contains("error[A027]") && said.contains("dot.png"), "{said}");
     }
 }
+
+#[test]
+fn points_by_the_hundred_thousand_are_too_many_and_no_wrong_calibration() {
+    let dir = TempDir::new().unwrap();
+    let pair = copy_of("bend", dir.path());
+    for (view, from) in [("L", 60.0), ("R", 61.0)] {
+        let along = |k: u32| from + 400.0 * f64::from(k) / 120_000.0;
+        let rows: String =
+            (0..120_000).map(|k| format!("{:.4},{:.4}\n", along(k), along(k))).collect();
+        write(pair.join(format!("points/points_{view}.csv")), &format!("x,y\n{rows}"));
+    }
+    let mut run = accurate();
+    run.args(["reconstruct", "-i", "points", "-o"]).arg(dir.path().join("out")).arg(&pair);
+    let (code, message) = failure(&mut run);
+    assert_eq!(code, 65, "{message}");
+    for words in ["120000 points", "limit", "0.5 px apart"] {
+        assert!(message.contains(words), "{message}");
+    }
+}

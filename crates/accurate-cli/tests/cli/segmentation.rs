@@ -351,3 +351,26 @@ fn a_dicom_run_is_segmented_by_its_mean_or_by_one_frame() {
     assert_eq!(code, 2, "{said}");
     assert!(said.contains("no DICOM run"), "{said}");
 }
+
+#[test]
+fn an_image_of_one_grey_value_is_to_be_looked_at_and_a_threshold_is_a_probability() {
+    let dir = TempDir::new().unwrap();
+    let model = dark_model(dir.path());
+    let black = dir.path().join("black.png");
+    accurate3d::io::write_u8(&black, &ndarray::Array2::zeros((64, 64))).unwrap();
+    let segment = |more: &[&str]| {
+        let mut command = accurate();
+        command.arg("segment").arg(&black).arg("-o").arg(dir.path().join("out"));
+        command.arg("--model").arg(&model).args(more);
+        failure(&mut command)
+    };
+    let (code, message) = segment(&[]);
+    assert_eq!(code, 65);
+    assert!(message.contains("look at the image") && !message.contains("mask"), "{message}");
+    for wrong in ["2", "-0.1", "NaN", "much"] {
+        let (code, message) = segment(&[&format!("--threshold={wrong}")]);
+        assert_eq!(code, 2);
+        let named = message.contains("--threshold") && message.contains("from 0 to 1");
+        assert!(named && !message.contains("low"), "{message}");
+    }
+}
