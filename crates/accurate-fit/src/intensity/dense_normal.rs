@@ -44,6 +44,13 @@ impl DenseNormal {
         }
     }
 
+    /// Adds equations of the same unknowns.
+    pub(crate) fn add_all(&mut self, other: &Self) {
+        let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(a, b)| *a += b);
+        add(&mut self.values, &other.values);
+        add(&mut self.gradient, &other.gradient);
+    }
+
     /// Adds half of `lambda3` times the squared third differences of the control points.
     pub(crate) fn add_smoothness(&mut self, control: &[Vector3<f64>], lambda3: f64) {
         for (first, window) in control.windows(4).enumerate() {

@@ -3,6 +3,7 @@ use accurate_geom::{Curve3, Point2, Point3, Polyline2, Rig};
 use ndarray::Array2;
 
 use super::band::Band;
+use super::both_views::both_views;
 use super::dense_normal::DenseNormal;
 use super::drawing::{Drawing, SAMPLES_PER_PX, radius_px};
 use super::params::IntensityFitParams;
@@ -134,10 +135,9 @@ impl IntensityPair {
         if let Some(error) = refused.filter(|_| points[0].is_empty()) {
             return Err(error);
         }
-        let bands = [
-            Band::new(&images[0], &points[0], 1, params)?,
-            Band::new(&images[1], &points[1], 2, params)?,
-        ];
+        let [band1, band2] =
+            both_views(|view| Band::new(&images[view], &points[view], view as u8 + 1, params));
+        let bands = [band1?, band2?];
         let priors = calibration.map(|(priors, _)| *priors);
         Ok(Self { params: *params, priors, nuisance, projectors, bands })
     }
@@ -270,13 +270,14 @@ impl Problem<'_> {
 
     fn cost(&self, state: &State) -> f64 {
         let c2 = self.cauchy_scale * self.cauchy_scale;
-        let mut cost = 0.0;
-        for view in 0..2 {
+        let of_view = |view: usize| {
             let drawing = self.drawing(state, view, false);
             let residuals = self.residuals(state, view, &drawing);
-            cost += residuals.iter().map(|r| 0.5 * c2 * (r * r / c2).ln_1p()).sum::<f64>();
-            cost += 0.5 * ((state.blur_px[view] - BLUR_PX) / BLUR_SIGMA_PX).powi(2);
-        }
+            residuals.iter().map(|r| 0.5 * c2 * (r * r / c2).ln_1p()).sum::<f64>()
+                + 0.5 * ((state.blur_px[view] - BLUR_PX) / BLUR_SIGMA_PX).powi(2)
+        };
+        let [cost1, cost2] = both_views(of_view);
+        let mut cost = cost1 + cost2;
         cost += 0.5 * smoothness(&state.spline, 0.0, self.lambda3, &[]);
         if let Some(weights) = self.prior_weights {
             let values = state.nuisance.values();
@@ -287,51 +288,57 @@ impl Problem<'_> {
 
     fn equations(&self, state: &State) -> DenseNormal {
         let first_global = 3 * state.spline.control.len();
-        let mut normal = DenseNormal::new(state.spline.control.len(), GLOBALS);
-        let c2 = self.cauchy_scale * self.cauchy_scale;
-        let mut sums = vec![0.0; first_global];
-        let mut seen: Vec<usize> = Vec::new();
-        let mut derivatives = Vec::new();
-        for view in 0..2 {
-            let (band, drawing) = (&self.bands[view], self.drawing(state, view, true));
-            let residuals = self.residuals(state, view, &drawing);
-            let scale = state.amplitude[view] / band.noise;
-            for ((row, drawn), residual) in drawing.rows.iter().zip(&drawing.depth).zip(residuals) {
-                seen.clear();
-                for (span, values) in &row.spans {
-                    for (k, value) in values.iter().enumerate() {
-                        sums[3 * span + k] += scale * value;
-                    }
-                    seen.extend(*span..span + 4);
-                }
-                if seen.is_empty() {
-                    continue;
-                }
-                seen.sort_unstable();
-                seen.dedup();
-                derivatives.clear();
-                for control in &seen {
-                    for k in 3 * control..3 * control + 3 {
-                        derivatives.push((k, std::mem::take(&mut sums[k])));
-                    }
-                }
-                derivatives.push((first_global + view, drawn / band.noise));
-                derivatives.push((first_global + 2 + view, scale * row.blur));
-                if view == 1 && self.prior_weights.is_some() {
-                    let values = row.nuisance.iter().enumerate();
-                    derivatives.extend(values.map(|(k, v)| (first_global + 4 + k, scale * v)));
-                }
-                normal.add(&derivatives, residual, 1.0 / (1.0 + residual * residual / c2));
-            }
-            let off = (state.blur_px[view] - BLUR_PX) / BLUR_SIGMA_PX;
-            normal.add(&[(first_global + 2 + view, 1.0 / BLUR_SIGMA_PX)], off, 1.0);
-        }
+        let [mut normal, other] = both_views(|view| self.equations_of(state, view));
+        normal.add_all(&other);
         normal.add_smoothness(&state.spline.control, self.lambda3);
         // What is no unknown is held where it is.
         let weights = self.prior_weights.unwrap_or([1.0; 3]);
         for (k, (weight, value)) in weights.into_iter().zip(state.nuisance.values()).enumerate() {
             normal.add(&[(first_global + 4 + k, 1.0)], value, weight);
         }
+        normal
+    }
+
+    /// What one picture says.
+    fn equations_of(&self, state: &State, view: usize) -> DenseNormal {
+        let first_global = 3 * state.spline.control.len();
+        let mut normal = DenseNormal::new(state.spline.control.len(), GLOBALS);
+        let c2 = self.cauchy_scale * self.cauchy_scale;
+        let mut sums = vec![0.0; first_global];
+        let mut seen: Vec<usize> = Vec::new();
+        let mut derivatives = Vec::new();
+        let (band, drawing) = (&self.bands[view], self.drawing(state, view, true));
+        let residuals = self.residuals(state, view, &drawing);
+        let scale = state.amplitude[view] / band.noise;
+        for ((row, drawn), residual) in drawing.rows.iter().zip(&drawing.depth).zip(residuals) {
+            seen.clear();
+            for (span, values) in &row.spans {
+                for (k, value) in values.iter().enumerate() {
+                    sums[3 * span + k] += scale * value;
+                }
+                seen.extend(*span..span + 4);
+            }
+            if seen.is_empty() {
+                continue;
+            }
+            seen.sort_unstable();
+            seen.dedup();
+            derivatives.clear();
+            for control in &seen {
+                for k in 3 * control..3 * control + 3 {
+                    derivatives.push((k, std::mem::take(&mut sums[k])));
+                }
+            }
+            derivatives.push((first_global + view, drawn / band.noise));
+            derivatives.push((first_global + 2 + view, scale * row.blur));
+            if view == 1 && self.prior_weights.is_some() {
+                let values = row.nuisance.iter().enumerate();
+                derivatives.extend(values.map(|(k, v)| (first_global + 4 + k, scale * v)));
+            }
+            normal.add(&derivatives, residual, 1.0 / (1.0 + residual * residual / c2));
+        }
+        let off = (state.blur_px[view] - BLUR_PX) / BLUR_SIGMA_PX;
+        normal.add(&[(first_global + 2 + view, 1.0 / BLUR_SIGMA_PX)], off, 1.0);
         normal
     }
 
@@ -433,7 +440,23 @@ fn without_ends(line: &Polyline2) -> &[Point2] {
 
 /// Largest distance of a point from a line.
 fn farthest(points: &[Point2], line: &Polyline2) -> f64 {
-    points.iter().map(|p| line.closest(p).distance).fold(0.0, f64::max)
+    /// Vertices to both sides of the one that was nearest to the point before.
+    const NEAR: usize = 8;
+    let vertices = line.points();
+    let (mut most, mut nearest) = (0.0_f64, 0_usize);
+    for point in points {
+        let from = nearest.saturating_sub(NEAR);
+        let near = &vertices[from..(nearest + NEAR).min(vertices.len())];
+        let to = |k: usize| (near[k] - point).norm_squared();
+        let best = (0..near.len()).min_by(|&a, &b| to(a).total_cmp(&to(b))).unwrap_or(0);
+        nearest = from + best;
+        // As near as that at least, and mostly that is near enough.
+        if to(best) > most * most {
+            let closest = line.closest(point);
+            (most, nearest) = (most.max(closest.distance), closest.segment);
+        }
+    }
+    most
 }
 
 /// The points, continued straight at both ends by `by`, in the direction of the last `over`.
@@ -461,5 +484,19 @@ mod tests {
         let points = [20.0, 50.0, 77.0].map(|x| Point2::new(x, 0.0));
         assert_eq!(farthest(&points, &line), 0.0);
         assert_eq!(farthest(&[Point2::new(40.0, 3.0), points[0]], &line), 3.0);
+    }
+
+    #[test]
+    fn the_farthest_point_is_found_whatever_the_order() {
+        let at = |k: usize| (0.05 * k as f64).sin_cos();
+        let round = |k| Point2::new(30.0 * at(k).0 + 0.1 * k as f64, 30.0 * at(k).1);
+        let line = Polyline2::new((0..400).map(round).collect()).unwrap();
+        for step in [1, 7, 150, 399] {
+            let points: Vec<_> = (0..400)
+                .map(|k| round(k * step % 400) + Vector2::new(0.01 * (k % 90) as f64, 0.3))
+                .collect();
+            let expected = points.iter().map(|p| line.closest(p).distance).fold(0.0, f64::max);
+            assert_eq!(farthest(&points, &line), expected, "{step}");
+        }
     }
 }

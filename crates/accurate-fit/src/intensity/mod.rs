@@ -2,6 +2,7 @@
 //! moved until the drawing explains the pictures.
 
 mod band;
+mod both_views;
 mod dense_normal;
 mod drawing;
 mod fit;
