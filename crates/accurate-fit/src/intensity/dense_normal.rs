@@ -6,6 +6,7 @@ use faer::linalg::cholesky::llt::factor::{
 use faer::linalg::cholesky::llt::inverse::{inverse, inverse_scratch};
 use faer::linalg::cholesky::llt::solve::{solve_in_place, solve_in_place_scratch};
 use faer::{Mat, MatMut, MatRef, Par};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::FitError;
 use crate::normal::{THIRD_DIFFERENCE, to_be_damped};
@@ -18,12 +19,29 @@ pub(crate) struct DenseNormal {
     /// Lower triangle, column by column.
     values: Vec<f64>,
     gradient: Vec<f64>,
+    /// Scratch: the derivatives of one residual, and where runs of consecutive unknowns begin and end among
+    /// them.
+    derivatives: Vec<f64>,
+    runs: Vec<Run>,
+}
+
+/// Derivatives from number `from` to `to` are those of consecutive unknowns from `unknown` on.
+struct Run {
+    unknown: usize,
+    from: usize,
+    to: usize,
 }
 
 impl DenseNormal {
     pub(crate) fn new(controls: usize, globals: usize) -> Self {
         let n = 3 * controls + globals;
-        Self { controls, values: vec![0.0; n * n], gradient: vec![0.0; n] }
+        Self {
+            controls,
+            values: vec![0.0; n * n],
+            gradient: vec![0.0; n],
+            derivatives: Vec::new(),
+            runs: Vec::new(),
+        }
     }
 
     fn unknowns(&self) -> usize {
@@ -33,15 +51,17 @@ impl DenseNormal {
     /// Adds `weight / 2 * residual²` with the residual's derivatives: unknowns and values, by
     /// ascending unknown.
     pub(crate) fn add(&mut self, derivatives: &[(usize, f64)], residual: f64, weight: f64) {
-        let n = self.unknowns();
-        for (k, &(column, value)) in derivatives.iter().enumerate() {
-            let scaled = weight * value;
-            self.gradient[column] += scaled * residual;
-            let entries = &mut self.values[n * column..n * (column + 1)];
-            for &(row, other) in &derivatives[k..] {
-                entries[row] += scaled * other;
+        self.derivatives.clear();
+        self.runs.clear();
+        for (k, &(unknown, value)) in derivatives.iter().enumerate() {
+            self.derivatives.push(value);
+            match self.runs.last_mut() {
+                Some(run) if run.unknown + k - run.from == unknown => run.to = k + 1,
+                _ => self.runs.push(Run { unknown, from: k, to: k + 1 }),
             }
         }
+        // No operation is fused: the same sums on every machine.
+        Arch::new().dispatch(Add { normal: self, residual, weight });
     }
 
     /// Adds equations of the same unknowns.
@@ -110,6 +130,41 @@ impl DenseNormal {
     fn singular(&self) -> FitError {
         FitError::Singular { unknowns: self.unknowns() }
     }
+}
+
+/// Adds the residual whose derivatives are laid out.
+struct Add<'n> {
+    normal: &'n mut DenseNormal,
+    residual: f64,
+    weight: f64,
+}
+
+impl WithSimd for Add<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let DenseNormal { values, gradient, derivatives, runs, .. } = self.normal;
+        let n = gradient.len();
+        for (r, run) in runs.iter().enumerate() {
+            for k in run.from..run.to {
+                let column = run.unknown + k - run.from;
+                let scaled = self.weight * derivatives[k];
+                gradient[column] += scaled * self.residual;
+                let entries = &mut values[n * column..n * (column + 1)];
+                add_scaled(&mut entries[column..], scaled, &derivatives[k..run.to]);
+                for other in &runs[r + 1..] {
+                    let others = &derivatives[other.from..other.to];
+                    add_scaled(&mut entries[other.unknown..], scaled, others);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add_scaled(entries: &mut [f64], factor: f64, values: &[f64]) {
+    entries.iter_mut().zip(values).for_each(|(entry, value)| *entry += factor * value);
 }
 
 /// The inverse of a symmetric matrix, of which the lower triangle is there.

@@ -1,6 +1,7 @@
 use std::ops::Range;
 
 use accurate_geom::nalgebra::{Matrix2x3, Vector2, Vector3};
+use pulp::{Arch, Simd, WithSimd};
 
 use super::band::Band;
 use crate::projector::Projector;
@@ -58,7 +59,9 @@ impl Drawing {
         let mut brush = Brush { blur_px, across: Vec::new() };
         for (u, piece) in pieces {
             if let Some(blot) = Blot::new(spline, u, piece, projector) {
-                brush.add(&blot, projector, band, &mut drawing);
+                // No operation is fused: the same drawing on every machine.
+                let (brush, drawing) = (&mut brush, &mut drawing);
+                Arch::new().dispatch(Stroke { brush, blot: &blot, projector, band, drawing });
             }
         }
         drawing
@@ -156,6 +159,19 @@ impl Blot {
         let weight = length * area;
         Some(Self { span, basis: b, basis_1: b1, image, jacobian, tangent, swing, weight, stretch })
     }
+
+    /// What the coordinates of the span's control points change of a pixel, for one unit of its derivatives
+    /// with respect to the blot's image, x and y, and of the blot's density there.
+    fn of_controls(&self) -> [[f64; 12]; 3] {
+        let Self { basis, basis_1, tangent, .. } = self;
+        let of_image = |axis: usize| {
+            let moved = self.jacobian.row(axis).transpose();
+            let turned = (moved - tangent * tangent.dot(&moved)) * self.swing;
+            std::array::from_fn(|k| moved[k % 3] * basis[k / 3] + turned[k % 3] * basis_1[k / 3])
+        };
+        let stretched = std::array::from_fn(|k| tangent[k % 3] * self.stretch * basis_1[k / 3]);
+        [of_image(0), of_image(1), stretched]
+    }
 }
 
 /// Puts blots of one size into a drawing.
@@ -165,12 +181,26 @@ struct Brush {
     across: Vec<(f64, f64)>,
 }
 
-impl Brush {
-    fn add(&mut self, blot: &Blot, projector: &Projector, band: &Band, drawing: &mut Drawing) {
-        let (blur_px, variance) = (self.blur_px, self.blur_px * self.blur_px);
-        let Blot { image, jacobian, tangent, weight, .. } = blot;
+/// One blot that is added to a drawing.
+struct Stroke<'a> {
+    brush: &'a mut Brush,
+    blot: &'a Blot,
+    projector: &'a Projector,
+    band: &'a Band,
+    drawing: &'a mut Drawing,
+}
+
+impl WithSimd for Stroke<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { brush, blot, projector, band, drawing } = self;
+        let (blur_px, variance) = (brush.blur_px, brush.blur_px * brush.blur_px);
+        let Blot { image, weight, .. } = blot;
         let roll = projector.roll_derivative(image);
-        self.each_pixel(blot, band, |n, [dx, dy], density| {
+        let [along_x, along_y, along_density] = blot.of_controls();
+        brush.each_pixel(blot, band, |n, [dx, dy], density| {
             let darkness = weight * density;
             drawing.depth[n] += darkness;
             let Some(row) = drawing.rows.get_mut(n) else { return };
@@ -184,20 +214,17 @@ impl Brush {
                 row.spans.push((blot.span, [0.0; 12]));
             }
             let Some((_, sums)) = row.spans.last_mut() else { return };
-            let moved = jacobian.transpose() * Vector2::new(gx, gy);
-            let turned = (moved - tangent * tangent.dot(&moved)) * blot.swing
-                + tangent * (density * blot.stretch);
-            for j in 0..4 {
-                for d in 0..3 {
-                    sums[3 * j + d] += moved[d] * blot.basis[j] + turned[d] * blot.basis_1[j];
-                }
+            for k in 0..12 {
+                sums[k] += gx * along_x[k] + gy * along_y[k] + density * along_density[k];
             }
         });
     }
+}
 
+impl Brush {
     /// Visits the pixels of the band that a blot reaches: their numbers, how far each is from its middle, px,
     /// and the blot's density there, 1/px².
-    #[inline]
+    #[inline(always)]
     fn each_pixel(
         &mut self,
         blot: &Blot,
