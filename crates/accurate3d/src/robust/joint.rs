@@ -119,6 +119,11 @@ impl RobustParams {
         second_look: SecondLook::InDoubt,
     };
 
+    /// Pairs that are fitted whatever comes of them, if there are so many.
+    pub(crate) fn sure_fits(&self) -> usize {
+        self.min_fits.min(self.enough_fits)
+    }
+
     /// Refuses weights and priors that nothing can be compared by.
     pub(crate) fn validate(&self) -> Result<(), FitError> {
         for (name, value) in [

@@ -80,7 +80,7 @@ impl Search<'_> {
         let proposals = propose_pairs(&angles, &signals1, &signals2, &params).map_err(matching)?;
         // Pairs that were looked at, and those among them that start another fit.
         let (mut count, mut fits) = (0, 0);
-        let mut starts = Vec::new();
+        let mut waiting = Vec::new();
         for proposal in &proposals {
             let proposal =
                 Proposal { i: proposal.i + from[0], j: proposal.j + from[1], ..*proposal };
@@ -97,23 +97,40 @@ impl Search<'_> {
                 continue;
             }
             fits += 1;
-            let mut wholly = true;
-            let shape = start.shape.clone();
-            if self.effort == Effort::Thorough {
-                starts.push(start);
-            } else {
-                let good = found.iter().filter(|c| c.good).map(|c| c.score).min_by(f64::total_cmp);
-                if let Some(judged) = self.judged(&start, good) {
-                    wholly = judged.wholly;
-                    found.push(judged.candidate);
-                }
+            waiting.push((tried.len(), start.curve, start.origin));
+            tried.push(Tried { proposal, start: start.shape, wholly: true });
+            // Until then no fit decides whether there is a next.
+            if self.effort == Effort::Quick && count >= self.params.sure_fits() {
+                self.fit_in_order(std::mem::take(&mut waiting), tried, found);
             }
-            tried.push(Tried { proposal, start: shape, wholly });
         }
-        // With much effort no fit decides about the next.
-        let judged = side_by_side(&starts, |start| self.judged(start, None));
-        found.extend(judged.into_iter().flatten().map(|judged| judged.candidate));
+        if self.effort == Effort::Quick {
+            self.fit_in_order(waiting, tried, found);
+        } else {
+            // Nor whether it is annealed.
+            let judged = side_by_side(&waiting, |(_, curve, origin)| {
+                self.judged(curve, origin, self.plain(curve, origin), None)
+            });
+            found.extend(judged.into_iter().flatten().map(|judged| judged.candidate));
+        }
         Ok(proposals.len())
+    }
+
+    /// Fits what waits, each with its number among the `tried`; what the ones before gave decides how far.
+    fn fit_in_order(
+        &self,
+        waiting: Vec<(usize, Curve3, Origin)>,
+        tried: &mut [Tried],
+        found: &mut Vec<Candidate>,
+    ) {
+        let plain = side_by_side(&waiting, |(_, curve, origin)| self.plain(curve, origin));
+        for ((number, curve, origin), plain) in waiting.into_iter().zip(plain) {
+            let good = found.iter().filter(|c| c.good).map(|c| c.score).min_by(f64::total_cmp);
+            if let Some(judged) = self.judged(&curve, &origin, plain, good) {
+                tried[number].wholly = judged.wholly;
+                found.push(judged.candidate);
+            }
+        }
     }
 
     /// Whether a good fit is there and the next proposal is not worth a try.
@@ -156,11 +173,20 @@ impl Search<'_> {
         Some(Start { curve, shape, origin })
     }
 
-    /// The better of a plain and, unless that is good already, an annealed fit. Without much effort
+    fn plain(&self, start: &Curve3, origin: &Origin) -> Option<Candidate> {
+        let fit = self.fit(start, &PLAIN)?;
+        Some(Candidate::new(fit, origin, self.rig, self.params))
+    }
+
+    /// The better of a `plain` and, unless that is good already, an annealed fit. Without much effort
     /// what is far behind the best `good` score is left at that.
-    fn judged(&self, start: &Start, good: Option<f64>) -> Option<Judged> {
-        let judge = |fit| Candidate::new(fit, &start.origin, self.rig, self.params);
-        let plain = self.fit(&start.curve, &PLAIN).map(judge);
+    fn judged(
+        &self,
+        start: &Curve3,
+        origin: &Origin,
+        plain: Option<Candidate>,
+        good: Option<f64>,
+    ) -> Option<Judged> {
         if let Some(mut plain) = plain.clone().filter(|c| c.is_good(self.params)) {
             plain.good = true;
             return Some(Judged { candidate: plain, wholly: true });
@@ -171,7 +197,8 @@ impl Search<'_> {
         if let Some(candidate) = plain.clone().filter(hopeless) {
             return Some(Judged { candidate, wholly: false });
         }
-        let annealed = self.fit(&start.curve, &ANNEALED).map(judge);
+        let judge = |fit| Candidate::new(fit, origin, self.rig, self.params);
+        let annealed = self.fit(start, &ANNEALED).map(judge);
         let best = [plain, annealed].into_iter().flatten();
         let best = best.min_by(|a, b| a.score.total_cmp(&b.score))?;
         Some(Judged { candidate: self.checked(best), wholly: true })
