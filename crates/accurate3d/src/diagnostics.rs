@@ -70,6 +70,8 @@ pub struct PointsDiagnostics {
     pub chi2_per_point: f64,
     /// Points of each view that lie beyond what the other one sees.
     pub beyond: [usize; 2],
+    /// Largest standard deviation of the curve across its own direction, px.
+    pub sigma_px: f64,
 }
 
 /// What came of the adjustment of ordered points.
@@ -89,6 +91,7 @@ impl Adjustment {
                 rms_px: fit.rms_px,
                 chi2_per_point: fit.chi2_per_point,
                 beyond: fit.beyond,
+                sigma_px: 0.0,
             }),
             calibration: done.and_then(|fit| fit.calibration.as_ref()).map(Into::into),
         }
@@ -217,8 +220,10 @@ impl Diagnostics {
         counts: [usize; 2],
         along_epipolar_line: &[bool],
         adjustment: Adjustment,
+        sigma_px: f64,
     ) -> Self {
         let Adjustment { refusal, fit, calibration } = adjustment;
+        let fit = fit.map(|fit| PointsDiagnostics { sigma_px, ..fit });
         let fraction = |range: &Range<usize>, count: usize| range.len() as f64 / count as f64;
         let matched_fraction =
             [fraction(&matched.matched1, counts[0]), fraction(&matched.matched2, counts[1])];
@@ -229,7 +234,15 @@ impl Diagnostics {
             fit.chi2_per_point > MOST_CHI2_PER_POINT && fit.rms_px[1] > MISFIT_PX
         });
         suspicions.extend(misfit.then_some(Suspicion::Misfit));
+        suspicions.extend((sigma_px > MOST_SIGMA_PX).then_some(Suspicion::Uncertain));
+        let matched_points = matched.matched1.len() + matched.matched2.len();
+        let beyond = fit.map_or(0, |fit| fit.beyond[0] + fit.beyond[1]);
+        let left_out = (counts[0] + counts[1] + beyond).saturating_sub(matched_points) as f64;
+        let is_bought = matched.margin_px.is_some_and(|margin| margin < BOUGHT_MARGIN_PX)
+            && left_out > BOUGHT_SHARE * (counts[0] + counts[1]) as f64;
+        suspicions.extend(is_bought.then_some(Suspicion::Ambiguous));
         suspicions.extend(refusal.is_some().then_some(Suspicion::NotAdjusted));
+        suspicions.sort_unstable();
         Self {
             mean_epipolar_distance_px: matched.mean_epipolar_distance_px,
             max_epipolar_distance_px: refusal.as_ref().and_then(|_| {
@@ -298,8 +311,17 @@ fn share(flags: &[bool]) -> f64 {
     flags.iter().filter(|f| **f).count() as f64 / flags.len().max(1) as f64
 }
 
-/// Rounded points leave 1 if the curve is right, and about 1.2 if they also jump by a pixel at corners.
-const MOST_CHI2_PER_POINT: f64 = 1.5;
+/// Rounded points leave 1 if the curve is right, all the pixels that a line crosses 1.6 on average over its
+/// directions, and 2 if it runs diagonally.
+const MOST_CHI2_PER_POINT: f64 = 2.0;
+
+/// Most that the position of a curve may be in doubt across it, px.
+const MOST_SIGMA_PX: f64 = 2.0;
+
+/// A match in the wrong direction leaves out what does not fit. Where the other direction costs hardly more,
+/// px a point, and such a share of the points is left out, it may be that.
+const BOUGHT_MARGIN_PX: f64 = 0.06;
+const BOUGHT_SHARE: f64 = 0.02;
 
 /// Points without noise lie no farther from a spline than it bends between its knots, px.
 const MISFIT_PX: f64 = 0.05;

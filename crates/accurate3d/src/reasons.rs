@@ -37,7 +37,9 @@ impl Diagnostics {
                 Some(format!("{:.0} %", 100.0 * uncovered))
             }
             Suspicion::Uncertain => {
-                evidence.map(|e| format!("standard deviation up to {:.1} px", e.sigma_px))
+                let of_points = self.points_fit.map(|fit| fit.sigma_px);
+                let sigma_px = evidence.map(|e| e.sigma_px).or(of_points);
+                sigma_px.map(|px| format!("standard deviation up to {px:.1} px"))
             }
             Suspicion::TurnsBack => {
                 evidence.map(|e| format!("over {:.0} px upon itself in both views", e.doubled_px))
@@ -181,14 +183,16 @@ mod tests {
         let points_fit = PointsDiagnostics {
             noise_px: 0.3,
             rms_px: [0.5, 0.4],
-            chi2_per_point: 1.83,
+            chi2_per_point: 2.13,
             beyond: [0; 2],
+            sigma_px: 2.34,
         };
         let found = Diagnostics {
             suspicions: vec![
                 Suspicion::Misfit,
                 Suspicion::Ambiguous,
                 Suspicion::Uncovered,
+                Suspicion::Uncertain,
                 Suspicion::NotAdjusted,
             ],
             points_fit: Some(points_fit),
@@ -197,9 +201,10 @@ mod tests {
             ..FOUND
         };
         let expected = [
-            "misfit (1.8 times the noise)",
+            "misfit (2.1 times the noise)",
             "ambiguous order (another match costs 0.02 px a point more)",
             "part of the body left out (10 %)",
+            "weakly seen (standard deviation up to 2.3 px)",
             "match not adjusted (no basis)",
         ];
         assert_eq!(found.reasons(), expected);

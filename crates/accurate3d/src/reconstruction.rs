@@ -103,9 +103,7 @@ impl Reconstruction {
     /// The largest standard deviation of each point across the curve, in the rig's unit, if the method gives
     /// an uncertainty: where a point lies along it is a matter of parametrisation, and moves no curve.
     pub fn sigmas_across(&self) -> Option<Vec<f64>> {
-        let positions = self.positions();
-        let of = |(i, covariance)| sigma_across(&positions, i, covariance);
-        self.covariances.as_ref().map(|list| list.iter().enumerate().map(of).collect())
+        self.covariances.as_ref().map(|list| sigmas_across(&self.positions(), list))
     }
 
     /// `sigma`, the largest standard deviation in any direction, `sigma_across`, and the covariance's six
@@ -136,6 +134,12 @@ impl Reconstruction {
         }
         columns
     }
+}
+
+/// The largest standard deviation of each point across the curve, in the points' unit.
+pub(crate) fn sigmas_across(points: &[Point3], covariances: &[Matrix3<f64>]) -> Vec<f64> {
+    let of = |(i, covariance)| sigma_across(points, i, covariance);
+    covariances.iter().enumerate().map(of).collect()
 }
 
 fn sigma_across(points: &[Point3], i: usize, covariance: &Matrix3<f64>) -> f64 {

@@ -239,3 +239,45 @@ fn parts_left_out_in_both_views_are_a_reason_for_doubt() {
         assert!(both.contains(&Suspicion::Uncovered), "{index}: {both:?}");
     }
 }
+
+/// Whole pixels of 10 wires, and how many of the results are doubted for which reason.
+#[test]
+fn right_curves_of_whole_pixels_are_not_doubted() {
+    for family in [Family::Easy, Family::Carm] {
+        for index in 0..10 {
+            let case = generate(family, 1302, index, &CaseOptions::default()).unwrap();
+            let given = pair(&case.rig, Some(case.rounded_points.clone()), None);
+            let found = accurate(&given, InputKind::Points).unwrap().diagnostics;
+            // All the pixels that a diagonal crosses lie up to 0.7 px from it.
+            assert_eq!(found.suspicions, [], "{family} {index}: {:?}", found.points_fit);
+        }
+    }
+}
+
+/// A match that leaves out a tenth of a view, 60 px off; one that was fitted to something else, 9 px off.
+#[test]
+fn what_buys_its_fit_and_what_does_not_fit_is_doubted() {
+    for (family, index, reason) in
+        [(Family::Easy, 40, Suspicion::Ambiguous), (Family::Carm, 7, Suspicion::Misfit)]
+    {
+        let case = generate(family, 1301, index, &CaseOptions::default()).unwrap();
+        let given = pair(&case.rig, Some(case.rounded_points.clone()), None);
+        let found = accurate(&given, InputKind::Points).unwrap().diagnostics;
+        assert_eq!(found.suspicions, [reason], "{family} {index}");
+    }
+}
+
+#[test]
+fn a_straight_wire_along_the_baseline_is_weakly_seen() {
+    let case = generate(Family::Easy, SEED, 0, &CaseOptions::default()).unwrap();
+    let cameras = [case.rig.camera1(), case.rig.camera2()];
+    let baseline = cameras[1].centre() - cameras[0].centre();
+    let middle = case.truth[case.truth.len() / 2];
+    let length: f64 = case.truth.windows(2).map(|w| (w[1] - w[0]).norm()).sum();
+    let along = baseline.normalize() * (0.3 * length / 200.0);
+    let seen = |k: i32| case.rig.project(&(middle + along * f64::from(k))).unwrap();
+    let points: OrderedPoints = (-100..100).map(seen).unzip();
+    let found = accurate(&pair(&case.rig, Some(points), None), InputKind::Points);
+    let found = found.unwrap().diagnostics;
+    assert!(found.suspicions.contains(&Suspicion::Uncertain), "{found:?}");
+}

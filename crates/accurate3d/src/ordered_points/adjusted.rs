@@ -3,6 +3,8 @@ use accurate_geom::{Pixel, Rig, View1, View2};
 use accurate_match::{CurvePoint, FreeMatch};
 
 use crate::diagnostics::Adjustment;
+use crate::reconstruction::sigmas_across;
+use crate::robust::px_per_unit;
 use crate::sampled_curve::along_epipolar_lines;
 use crate::{Diagnostics, Error, Explanation, Params, Reconstruction, Traces, ViewPair};
 
@@ -30,8 +32,16 @@ impl Adjusted<'_> {
         let along_epipolar_line = along_epipolar_lines(&self.points, self.rig)
             .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;
         let counts = [given.0.len(), given.1.len()];
-        let diagnostics =
-            Diagnostics::of_free_match(self.matched, counts, &along_epipolar_line, self.adjustment);
+        let positions: Vec<_> = self.points.iter().map(|p| p.position).collect();
+        let sigmas = self.covariances.iter().flat_map(|list| sigmas_across(&positions, list));
+        let sigma_px = sigmas.fold(0.0, f64::max) * px_per_unit(&positions, self.rig);
+        let diagnostics = Diagnostics::of_free_match(
+            self.matched,
+            counts,
+            &along_epipolar_line,
+            self.adjustment,
+            sigma_px,
+        );
         Ok(Reconstruction {
             id: pair.id.clone(),
             method: params.method,
