@@ -52,7 +52,10 @@ pub use published::{
     Dataset, Metric, PUBLISHED_ROWS, PublishedCell, PublishedInput, PublishedRow, published,
     published_cells, published_table,
 };
-pub use quantile::{Proportion, fraction_below, median, quantile, wilson_interval};
+pub use quantile::{
+    Proportion, QuantileInterval, fraction_below, median, quantile, quantile_interval,
+    wilson_interval,
+};
 pub use reprojection::{ReprojectionRms, reprojection_rms};
 pub use scores::{TableScores, accuracy, completeness, table_scores};
 pub use umeyama::{Alignment, LEAST_SPREAD_RATIO, Similarity, align_rigid, align_similarity};

@@ -10,7 +10,8 @@
 use std::error::Error;
 
 use accurate3d::eval::{
-    DEFAULT_RESAMPLES, bootstrap_mean, curve_scores, quantile, table_scores, wilson_interval,
+    DEFAULT_RESAMPLES, bootstrap_mean, curve_scores, quantile_interval, table_scores,
+    wilson_interval,
 };
 use accurate3d::fit::CalibrationPriors;
 use accurate3d::geom::{Camera, Point3, Triangulation, Triangulator};
@@ -318,12 +319,7 @@ fn value(figure: Figure, scores: &[Option<Scores>]) -> Result<Value, Failure> {
         Ok(Value { value: Some(p.fraction), text })
     };
     let at = |values: Vec<f64>, q: f64| -> Result<Value, Failure> {
-        // Ranks between which the quantile lies with 95 %: normal approximation of the binomial.
-        let n = values.len() as f64;
-        let spread = 1.96 * (q * (1.0 - q) / n).sqrt();
-        let middle = quantile_or_infinity(&values, q)?;
-        let low = quantile_or_infinity(&values, (q - spread).max(0.0))?;
-        let high = quantile_or_infinity(&values, (q + spread).min(1.0))?;
+        let [middle, low, high] = interval_or_infinity(&values, q)?;
         Ok(Value { value: Some(middle), text: format!("{middle:.3} [{low:.3}, {high:.3}]") })
     };
     let mean = |value: fn(&Scores) -> f64| -> Result<Value, Failure> {
@@ -355,10 +351,11 @@ fn value(figure: Figure, scores: &[Option<Scores>]) -> Result<Value, Failure> {
     }
 }
 
-/// The quantile of values of which some may be infinite.
-fn quantile_or_infinity(values: &[f64], q: f64) -> Result<f64, Failure> {
+/// The quantile of values of which some may be infinite, and its interval.
+fn interval_or_infinity(values: &[f64], q: f64) -> Result<[f64; 3], Failure> {
     const FAR: f64 = 1e9;
     let bounded: Vec<f64> = values.iter().map(|v| v.min(FAR)).collect();
-    let found = quantile(&bounded, q)?;
-    Ok(if found > 0.5 * FAR { f64::INFINITY } else { found })
+    let found = quantile_interval(&bounded, q)?;
+    let far = |value: f64| if value > 0.5 * FAR { f64::INFINITY } else { value };
+    Ok([found.value, found.low, found.high].map(far))
 }

@@ -1,6 +1,6 @@
 use accurate_eval::{
     CurveScores, DEFAULT_RESAMPLES, EvalError, Metric, TableScores, bootstrap_mean, curve_scores,
-    fraction_below, quantile, table_scores,
+    fraction_below, quantile_interval, table_scores,
 };
 use accurate_fit::CalibrationPriors;
 use accurate_geom::{LengthUnit, Point3, Rig};
@@ -120,7 +120,7 @@ fn bytes_of(pair: &ViewPair) -> Vec<u8> {
     bytes
 }
 
-/// A mean with its 95 % interval; a median or quantile has none and repeats its value.
+/// A mean, quantile or share with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Figure {
     /// The value itself.
@@ -341,7 +341,11 @@ fn columns(
     let hausdorff: Vec<f64> = curve.iter().map(|c| c.hausdorff).collect();
     let hausdorff_px: Vec<f64> = scored.iter().filter_map(|s| s.hausdorff_px()).collect();
     let point = |values: &[f64], probability| {
-        quantile(values, probability).map(|value| Figure { value, low: value, high: value })
+        quantile_interval(values, probability).map(|found| Figure {
+            value: found.value,
+            low: found.low,
+            high: found.high,
+        })
     };
     let right = fraction_below(&hausdorff_px, RIGHT_PX)?;
     Ok(vec![
