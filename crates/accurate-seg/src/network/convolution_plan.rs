@@ -18,7 +18,8 @@ pub(super) struct PlannedConvolution {
 /// The convolutions of `graph` that can be computed by themselves, in the order in which they can be: with as
 /// much padding as keeps the middle of a square kernel in the image, all channels together.
 pub(super) fn plan(graph: &GraphProto) -> Vec<PlannedConvolution> {
-    graph.node.iter().filter_map(|node| planned(graph, node)).collect()
+    let makers = makers(graph);
+    graph.node.iter().filter_map(|node| planned(&makers, node)).collect()
 }
 
 /// Of each value in `targets`, which of the values in `known` it is computed from, with nothing known in
@@ -28,8 +29,7 @@ pub(super) fn needs(
     known: &[&str],
     targets: &[&str],
 ) -> Vec<Vec<(usize, bool)>> {
-    let makers: HashMap<&str, &NodeProto> =
-        graph.node.iter().flat_map(|n| n.output.iter().map(move |o| (o.as_str(), n))).collect();
+    let makers = makers(graph);
     let index: HashMap<&str, usize> = known.iter().enumerate().map(|(k, n)| (*n, k)).collect();
     let of = |target: &&str| {
         let (mut found, mut seen, mut open) = (Vec::new(), HashSet::new(), vec![*target]);
@@ -55,7 +55,17 @@ pub(super) fn needs(
     needs
 }
 
-fn planned(graph: &GraphProto, node: &NodeProto) -> Option<PlannedConvolution> {
+/// The node that makes each value.
+type Makers<'g> = HashMap<&'g str, &'g NodeProto>;
+
+fn makers(graph: &GraphProto) -> Makers<'_> {
+    graph.node.iter().flat_map(|n| n.output.iter().map(move |o| (o.as_str(), n))).collect()
+}
+
+/// Larger strides leave out most of an image: they would be laid out in as many parts.
+const MAX_STRIDE: i64 = 4;
+
+fn planned(makers: &Makers<'_>, node: &NodeProto) -> Option<PlannedConvolution> {
     if node.op_type != "Conv" {
         return None;
     }
@@ -67,36 +77,33 @@ fn planned(graph: &GraphProto, node: &NodeProto) -> Option<PlannedConvolution> {
     let padded = side == 1 || ints("pads").is_some();
     let stride = ints("strides").map_or(1, |n| n.first().copied().unwrap_or(1));
     let alike = all("strides", stride) && all("dilations", 1) && group == 1;
+    let known = is_middle && padded && alike && (1..=MAX_STRIDE).contains(&stride);
     let [input, weights, bias @ ..] = node.input.as_slice() else { return None };
     let [output] = node.output.as_slice() else { return None };
-    (is_middle && padded && alike).then_some(PlannedConvolution {
-        inputs: joined(graph, input),
+    known.then_some(PlannedConvolution {
+        inputs: joined(makers, input),
         output: output.clone(),
-        weights: stored(graph, weights).to_owned(),
-        bias: bias.first().map(|name| stored(graph, name).to_owned()),
+        weights: stored(makers, weights).to_owned(),
+        bias: bias.first().map(|name| stored(makers, name).to_owned()),
         stride: usize::try_from(stride).ok()?,
     })
 }
 
 /// The values that are concatenated along their channels to one, or the one.
-fn joined(graph: &GraphProto, name: &str) -> Vec<String> {
+fn joined(makers: &Makers<'_>, name: &str) -> Vec<String> {
     let is_channels = |node: &NodeProto| {
         node.attribute.iter().any(|a| a.name == "axis" && (a.i == 1 || a.i == -3))
     };
-    match maker(graph, name) {
+    match makers.get(name) {
         Some(node) if node.op_type == "Concat" && is_channels(node) => node.input.clone(),
         _ => vec![name.to_owned()],
     }
 }
 
 /// The tensor that a weight is cast from, or the weight.
-fn stored<'g>(graph: &'g GraphProto, name: &'g str) -> &'g str {
-    let cast = maker(graph, name).filter(|node| node.op_type == "Cast");
+fn stored<'g>(makers: &Makers<'g>, name: &'g str) -> &'g str {
+    let cast = makers.get(name).filter(|node| node.op_type == "Cast");
     cast.and_then(|node| node.input.first()).map_or(name, String::as_str)
-}
-
-fn maker<'g>(graph: &'g GraphProto, name: &str) -> Option<&'g NodeProto> {
-    graph.node.iter().find(|node| node.output.iter().any(|output| output == name))
 }
 
 #[cfg(test)]
@@ -158,7 +165,7 @@ mod tests {
 
     #[test]
     fn other_convolutions_are_left_alone() {
-        let others: [&[(&str, &[i64])]; 7] = [
+        let others: [&[(&str, &[i64])]; 8] = [
             &[("kernel_shape", &[3, 3])],
             &[("kernel_shape", &[3, 3]), ("pads", &[1, 1, 1, 0])],
             &[("kernel_shape", &[3, 1]), ("pads", &[1, 1, 1, 1])],
@@ -166,6 +173,7 @@ mod tests {
             &[MIDDLE[0], MIDDLE[1], ("strides", &[2, 1])],
             &[MIDDLE[0], MIDDLE[1], ("dilations", &[2, 2])],
             &[MIDDLE[0], MIDDLE[1], ("group", &[2])],
+            &[MIDDLE[0], MIDDLE[1], ("strides", &[9, 9])],
         ];
         for attributes in others {
             let node = vec![node("Conv", &["image", "w"], "out", attributes)];

@@ -63,14 +63,14 @@ impl RtenEngine {
 
         let mut known = vec![spec.input.as_str()];
         let mut names = Vec::new();
-        let mut prepared_ones = Vec::new();
+        let mut ready = Vec::new();
         let planned = plan(&graph);
         for planned in &planned {
             // What rten has made something else of stays with it.
             if let Some(convolution) = prepared(&model, planned) {
                 known.push(&planned.output);
                 names.extend(planned.inputs.iter().map(String::as_str));
-                prepared_ones.push((convolution, planned.inputs.len()));
+                ready.push((convolution, planned.inputs.len()));
             }
         }
         names.push(&spec.output);
@@ -80,7 +80,7 @@ impl RtenEngine {
         }
         let known = known.into_iter().map(node).collect::<Result<_, _>>()?;
         let mut targets = targets.into_iter();
-        let convolutions = prepared_ones
+        let convolutions = ready
             .into_iter()
             .map(|(convolution, inputs)| (convolution, targets.by_ref().take(inputs).collect()))
             .collect();
