@@ -3,7 +3,7 @@ use accurate_seg::{Mask, distance_to_background, median_width_px};
 use accurate_traverse::{TraverseError, Walk, WalkEnd, WalkParams, extend_to_body_ends, recentre};
 use ndarray::Array2;
 
-use crate::robust::{Frame, Turn, ViewCandidates, upright_turn};
+use crate::robust::{Turn, ViewCandidates, upright};
 use crate::{Error, JunctionDecision};
 
 /// The centreline of the body in one mask, in order, by [`trace_mask`].
@@ -38,9 +38,7 @@ pub struct MaskTrace {
 /// # Cost
 /// Thinning and distances O(pixels), the search of walks, O(length) for the rest: 10 ms for 512 x 512 px.
 pub fn trace_mask<V: View>(mask: &Array2<bool>, name: &str) -> Result<MaskTrace, Error> {
-    let turn = upright_turn(mask);
-    let frame = Frame::new(turn, [0.0; 2], mask);
-    let mask = &turn.array(mask);
+    let (mask, frame) = &upright(mask);
     let view = ViewCandidates::<V>::of(mask, None, &WalkParams::DEFAULT, Turn::NONE, name)?;
     let nothing = || Error::NoCandidate { case: name.to_owned(), walks: [0; 2], pairs: 0 };
     let walk = view.walks.first().ok_or_else(nothing)?;
@@ -58,7 +56,7 @@ pub fn trace_mask<V: View>(mask: &Array2<bool>, name: &str) -> Result<MaskTrace,
         coverage: walk.coverage,
         bridges: links + usize::from(walk.flags.first().is_some_and(|flags| flags.link)),
         margin: view.walks.get(1).map(|other| other.cost.total() - walk.cost.total()),
-        junctions: view.junctions(0, &frame),
+        junctions: view.junctions(0, frame),
     })
 }
 

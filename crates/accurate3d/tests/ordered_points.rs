@@ -240,7 +240,6 @@ fn parts_left_out_in_both_views_are_a_reason_for_doubt() {
     }
 }
 
-/// Whole pixels of 10 wires, and how many of the results are doubted for which reason.
 #[test]
 fn right_curves_of_whole_pixels_are_not_doubted() {
     for family in [Family::Easy, Family::Carm] {

@@ -43,7 +43,7 @@ impl Turn {
         }
     }
 
-    /// Where a point of an image `width` wide is shown in the turned one, which is `turned_width` wide.
+    /// Where a point of an image is shown in the turned one, which is `turned_width` wide.
     fn point(self, [x, y]: [f64; 2], turned_width: f64) -> [f64; 2] {
         match self {
             Self::MirrorX => [turned_width - 1.0 - x, y],

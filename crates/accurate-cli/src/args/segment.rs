@@ -67,12 +67,8 @@ pub struct SegmentArgs {
 }
 
 fn probability(text: &str) -> Result<f32, String> {
-    let value: f32 = text.parse().map_err(|_| "expected a number from 0 to 1".to_owned())?;
-    if (0.0..=1.0).contains(&value) {
-        Ok(value)
-    } else {
-        Err("expected a number from 0 to 1".to_owned())
-    }
+    let value = text.parse().ok().filter(|value| (0.0..=1.0).contains(value));
+    value.ok_or_else(|| "expected a number from 0 to 1".to_owned())
 }
 
 #[derive(Debug, Subcommand)]

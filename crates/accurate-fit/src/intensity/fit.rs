@@ -3,14 +3,15 @@ use accurate_geom::{Curve3, Point2, Point3, Polyline2, Rig};
 use ndarray::Array2;
 
 use super::band::Band;
-use super::both_views::both_views;
 use super::dense_normal::DenseNormal;
 use super::drawing::{Drawing, SAMPLES_PER_PX, radius_px};
+use super::moved::farthest_apart;
 use super::params::IntensityFitParams;
 use crate::curve::{dense_points, to_curve};
 use crate::outline_problem::smoothness;
 use crate::pose::{POINTS_PER_SPAN, px_per_unit, spans_for};
 use crate::projector::{Nuisance, Projector};
+use crate::side_by_side::both_views;
 use crate::uniform_spline::UniformSpline;
 use crate::{CalibrationEstimate, CalibrationPriors, CurveCovariance, FitError};
 
@@ -24,8 +25,6 @@ const BLUR_SIGMA_PX: f64 = 0.3;
 const BLUR_RANGE_PX: (f64, f64) = (0.7, 2.5);
 /// How far back along the curve its end's direction is taken from, px.
 const DIRECTION_PX: f64 = 3.0;
-/// What of an end may move without counting as moved, px.
-const FREE_END_PX: f64 = 8.0;
 
 /// A curve fitted to the grey levels of both images.
 #[derive(Debug, Clone)]
@@ -392,9 +391,7 @@ impl Problem<'_> {
             };
             let after = line(shown(&state.spline, self.samples, projector))?;
             let before = line(given.iter().map(|p| projector.project(&p.coords)).collect())?;
-            moved_px = moved_px
-                .max(farthest(without_ends(&after), &before))
-                .max(farthest(without_ends(&before), &after));
+            moved_px = moved_px.max(farthest_apart(&before, &after));
             let drawing = self.drawing(state, view, false);
             let darkest = drawing.depth.iter().copied().fold(0.0, f64::max);
             contrast_to_noise[view] = state.amplitude[view] * darkest / self.bands[view].noise;
@@ -430,35 +427,6 @@ fn shown(spline: &UniformSpline, samples: usize, projector: &Projector) -> Vec<V
     (0..=samples).map(|k| projector.project(&spline.point(k as f64 * du))).collect()
 }
 
-/// The points without those of the last [`FREE_END_PX`] at both ends.
-fn without_ends(line: &Polyline2) -> &[Point2] {
-    let arc_px = line.cumulative_lengths();
-    let first = arc_px.partition_point(|arc| *arc < FREE_END_PX);
-    let end = arc_px.partition_point(|arc| *arc <= line.length() - FREE_END_PX);
-    &line.points()[first.min(end)..end]
-}
-
-/// Largest distance of a point from a line.
-fn farthest(points: &[Point2], line: &Polyline2) -> f64 {
-    /// Vertices to both sides of the one that was nearest to the point before.
-    const NEAR: usize = 8;
-    let vertices = line.points();
-    let (mut most, mut nearest) = (0.0_f64, 0_usize);
-    for point in points {
-        let from = nearest.saturating_sub(NEAR);
-        let near = &vertices[from..(nearest + NEAR).min(vertices.len())];
-        let to = |k: usize| (near[k] - point).norm_squared();
-        let best = (0..near.len()).min_by(|&a, &b| to(a).total_cmp(&to(b))).unwrap_or(0);
-        nearest = from + best;
-        // As near as that at least, and mostly that is near enough.
-        if to(best) > most * most {
-            let closest = line.closest(point);
-            (most, nearest) = (most.max(closest.distance), closest.segment);
-        }
-    }
-    most
-}
-
 /// The points, continued straight at both ends by `by`, in the direction of the last `over`.
 fn continued(points: &[Point3], by: f64, over: f64) -> Vec<Point3> {
     let beyond = |end: Option<&Point3>, mut inwards: std::slice::Iter<'_, Point3>| {
@@ -472,31 +440,4 @@ fn continued(points: &[Point3], by: f64, over: f64) -> Vec<Point3> {
     all.extend_from_slice(points);
     all.extend(beyond(points.last(), reversed.iter()));
     all
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_lies_on_a_line_between_its_vertices_has_not_moved() {
-        let line = Polyline2::new(vec![Point2::new(0.0, 0.0), Point2::new(100.0, 0.0)]).unwrap();
-        let points = [20.0, 50.0, 77.0].map(|x| Point2::new(x, 0.0));
-        assert_eq!(farthest(&points, &line), 0.0);
-        assert_eq!(farthest(&[Point2::new(40.0, 3.0), points[0]], &line), 3.0);
-    }
-
-    #[test]
-    fn the_farthest_point_is_found_whatever_the_order() {
-        let at = |k: usize| (0.05 * k as f64).sin_cos();
-        let round = |k| Point2::new(30.0 * at(k).0 + 0.1 * k as f64, 30.0 * at(k).1);
-        let line = Polyline2::new((0..400).map(round).collect()).unwrap();
-        for step in [1, 7, 150, 399] {
-            let points: Vec<_> = (0..400)
-                .map(|k| round(k * step % 400) + Vector2::new(0.01 * (k % 90) as f64, 0.3))
-                .collect();
-            let expected = points.iter().map(|p| line.closest(p).distance).fold(0.0, f64::max);
-            assert_eq!(farthest(&points, &line), expected, "{step}");
-        }
-    }
 }

@@ -2,10 +2,10 @@
 //! moved until the drawing explains the pictures.
 
 mod band;
-mod both_views;
 mod dense_normal;
 mod drawing;
 mod fit;
+mod moved;
 mod params;
 mod shown;
 mod smooth;

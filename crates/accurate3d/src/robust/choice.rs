@@ -1,4 +1,4 @@
-use accurate_fit::CalibrationEstimate;
+use accurate_fit::{CalibrationEstimate, side_by_side};
 use accurate_geom::{Rig, View1, View2};
 
 use super::candidates::ViewCandidates;
@@ -6,7 +6,6 @@ use super::evidence::{Evidence, Walks};
 use super::pairs::Tried;
 use super::score::Candidate;
 use super::search::{Effort, Search};
-use super::side_by_side::side_by_side;
 use crate::Error;
 
 /// Curves nowhere farther apart than this do not compete, px.

@@ -1,3 +1,4 @@
+use accurate_fit::side_by_side;
 use accurate_geom::Point3;
 use accurate_match::longest_chain;
 
@@ -7,7 +8,6 @@ use super::restart::BRIDGED_PX;
 use super::score::Candidate;
 use super::search::{Effort, Search};
 use super::shape::{dense, px_per_unit};
-use super::side_by_side::side_by_side;
 use super::start::through;
 
 /// Curves run together where they are no farther apart than this, px ...

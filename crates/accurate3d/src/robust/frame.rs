@@ -130,6 +130,14 @@ impl Frame {
         if self.turn.transposed { Pixel::new(y, x) } else { Pixel::new(x, y) }
     }
 
+    /// The camera whose image is turned as the part is.
+    ///
+    /// # Errors
+    /// As [`Turn::camera`].
+    pub(crate) fn camera(&self, camera: &Camera) -> Result<Camera, GeomError> {
+        self.turn.camera(camera)
+    }
+
     /// A direction of the turned part in the image.
     pub(crate) fn axes_in_image(&self) -> Matrix2<f64> {
         self.turn.axes().transpose()

@@ -1,6 +1,6 @@
 use accurate_fit::{
     CalibrationEstimate, CalibrationPriors, FitError, IntensityFit, IntensityFitParams,
-    IntensityPair, fit_intensities,
+    IntensityPair, fit_intensities, side_by_side,
 };
 use accurate_geom::{Curve3, Rig};
 use ndarray::Array2;
@@ -10,7 +10,6 @@ use super::finalists::SAME_PX;
 use super::joint::JointResult;
 use super::look::Seen;
 use super::score::Candidate;
-use super::side_by_side::side_by_side;
 use super::suspicion::Suspicion;
 use super::tails::{DOUBTED_LACKING_PX, Pictures};
 use crate::IntensityDiagnostics;

@@ -1,3 +1,4 @@
+use accurate_fit::side_by_side;
 use accurate_geom::nalgebra::Vector2;
 use accurate_geom::{Camera, Curve3, Point2, Point3, Rig};
 
@@ -5,7 +6,6 @@ use super::fitting::PLAIN;
 use super::score::Candidate;
 use super::search::Search;
 use super::shape::{dense, image_of, px_per_unit};
-use super::side_by_side::side_by_side;
 use super::start::through;
 
 /// A hairpin turns by more than this cosine ...

@@ -1,4 +1,4 @@
-use accurate_fit::OutlineFitParams;
+use accurate_fit::{OutlineFitParams, side_by_side};
 use accurate_geom::{Curve3, EpipolarAngle, Pixel, View, View1, View2};
 use accurate_match::{Proposal, ProposeParams, propose_pairs};
 
@@ -8,7 +8,6 @@ use super::fitting::{ANNEALED, PLAIN};
 use super::score::{Candidate, Origin};
 use super::search::{Effort, Search};
 use super::shape::Shape;
-use super::side_by_side::side_by_side;
 use super::start::{PRICES, start_from};
 use crate::Error;
 

@@ -1,4 +1,4 @@
-use accurate_fit::OutlineFitParams;
+use accurate_fit::{OutlineFitParams, side_by_side};
 use accurate_geom::{Curve3, Point3, View1, View2};
 
 use super::candidates::ViewCandidates;
@@ -6,7 +6,6 @@ use super::pairs::Tried;
 use super::score::Candidate;
 use super::search::Search;
 use super::shape::{dense, is_shown_near, px_per_unit};
-use super::side_by_side::side_by_side;
 use super::start::through;
 use crate::Error;
 

@@ -1,4 +1,4 @@
-use accurate_fit::OutlineFitParams;
+use accurate_fit::{OutlineFitParams, side_by_side};
 use accurate_geom::{Camera, Curve3, Pixel, Point3, Polyline, Rig, View};
 use accurate_match::FreeEnds;
 
@@ -8,7 +8,6 @@ use super::other_ways::{OtherWay, other_ways};
 use super::score::Candidate;
 use super::search::{Effort, Search};
 use super::shape::{Shape, dense, image_of, px_per_unit};
-use super::side_by_side::side_by_side;
 use super::start::{PRICES, start_from, through};
 
 /// Other ways of a candidate that are tried, and candidates whose ways are: without much effort ...

@@ -1,4 +1,4 @@
-use accurate_fit::{OutlineFitParams, start_curve};
+use accurate_fit::{OutlineFitParams, side_by_side, start_curve};
 use accurate_geom::{Curve3, Point3, View1, View2};
 use accurate_match::FreeEnds;
 
@@ -8,7 +8,6 @@ use super::pairs::Tried;
 use super::score::{Candidate, CutEnds};
 use super::search::{Effort, Search};
 use super::shape::{Shape, arc_lengths_px, dense, is_shown_near, px_per_unit};
-use super::side_by_side::side_by_side;
 use super::start::{OTHER_PRICES, start_from};
 
 /// A start no farther than this from a fitted curve would end there, px: within reach of the fit.

@@ -36,18 +36,16 @@ impl<'a> Upright<'a> {
             case: case.to_owned(),
             source: FitError::Geometry(source),
         };
-        let turns = [upright_turn(&masks[0]), upright_turn(&masks[1])];
-        let camera1 = turns[0].camera(rig.camera1()).map_err(geometry)?;
-        let camera2 = turns[1].camera(rig.camera2()).map_err(geometry)?;
+        let [(one, frame1), (two, frame2)] = [upright(&masks[0]), upright(&masks[1])];
+        let camera1 = frame1.camera(rig.camera1()).map_err(geometry)?;
+        let camera2 = frame2.camera(rig.camera2()).map_err(geometry)?;
         let turned = Rig::new(camera1, camera2, rig.unit()).map_err(geometry)?;
-        let [one, two] = [0, 1].map(|view| turns[view].array(&masks[view]));
-        let frames = [0, 1].map(|view| Frame::new(turns[view], [0.0; 2], &masks[view]));
         let order = two.shape().cmp(one.shape()).then_with(|| two.iter().cmp(&one));
         let swapped = is_exact && order.is_lt();
         let (masks, frames, rig) = if swapped {
-            ([two, one], [frames[1], frames[0]], turned.swapped())
+            ([two, one], [frame2, frame1], turned.swapped())
         } else {
-            ([one, two], frames, turned)
+            ([one, two], [frame1, frame2], turned)
         };
         Ok(Self { masks: Cow::Owned(masks), rig: Cow::Owned(rig), frames, swapped })
     }
@@ -68,7 +66,8 @@ impl<'a> Upright<'a> {
     }
 }
 
-/// The turn that brings a mask to the same pixels however it was turned before.
-pub(crate) fn upright_turn(mask: &Array2<bool>) -> Turn {
-    Turn::upright(&cut_to_body(mask).0, mask)
+/// A mask brought to the same pixels however it was turned before, and where it lies in the given one.
+pub(crate) fn upright(mask: &Array2<bool>) -> (Array2<bool>, Frame) {
+    let turn = Turn::upright(&cut_to_body(mask).0, mask);
+    (turn.array(mask), Frame::new(turn, [0.0; 2], mask))
 }

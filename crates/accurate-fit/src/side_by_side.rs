@@ -4,15 +4,23 @@ use rayon::prelude::*;
 ///
 /// Who works through many pairs has spread them over the threads already, and a thread that waits for a
 /// part of its pair would begin another pair meanwhile, and hold both in memory.
-pub(crate) fn side_by_side<T: Sync, R: Send>(
-    items: &[T],
-    work: impl Fn(&T) -> R + Sync + Send,
-) -> Vec<R> {
-    if items.len() < 2 || rayon::current_thread_index().is_some() {
+pub fn side_by_side<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    if items.len() < 2 || is_a_pools_own() {
         items.iter().map(work).collect()
     } else {
         items.par_iter().map(work).collect()
     }
+}
+
+/// The same for both views.
+pub(crate) fn both_views<R: Send>(work: impl Fn(usize) -> R + Sync) -> [R; 2] {
+    let (one, two) =
+        if is_a_pools_own() { (work(0), work(1)) } else { rayon::join(|| work(0), || work(1)) };
+    [one, two]
+}
+
+fn is_a_pools_own() -> bool {
+    rayon::current_thread_index().is_some()
 }
 
 #[cfg(test)]
