@@ -36,6 +36,8 @@ mod find;
 mod fingerprint;
 mod finite_check;
 mod image_file;
+#[cfg(test)]
+mod in_a_file;
 mod json;
 mod manifest;
 mod markups;

@@ -166,6 +166,7 @@ impl Manifest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::in_a_file::in_a_file;
 
     const GOOD: &str = r#"name = "helix"
 what = "Helices"
@@ -183,10 +184,7 @@ command = "accurate synth helix --count 26 --seed SEED --out OUT"
 "#;
 
     fn read(text: &str) -> Result<Manifest, IoError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("helix.toml");
-        fs::write(&path, text).unwrap();
-        read_manifest(&path)
+        in_a_file("helix.toml", text, read_manifest)
     }
 
     #[test]

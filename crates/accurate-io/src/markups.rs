@@ -219,12 +219,10 @@ pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::in_a_file::in_a_file;
 
     fn read_text_of(text: &str) -> Result<CurveTable, IoError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.mrk.json");
-        std::fs::write(&path, text).unwrap();
-        read(&path)
+        in_a_file("a.mrk.json", text, read)
     }
 
     #[test]

@@ -115,13 +115,10 @@ pub(crate) fn finite(path: &Path, value: f64, at: impl FnOnce() -> String) -> Re
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
+    use crate::in_a_file::in_a_file;
 
     fn read(text: &str) -> Result<Matrix3<f64>, IoError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("K_L.txt");
-        fs::write(&path, text).unwrap();
-        read_matrix3(&path)
+        in_a_file("K_L.txt", text, read_matrix3)
     }
 
     #[test]

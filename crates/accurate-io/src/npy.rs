@@ -139,18 +139,16 @@ fn check_header(bytes: &[u8]) -> Result<usize, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::in_a_file::in_a_file;
     use std::fs;
 
     fn read_raw(header: &str, data: &[u8]) -> Result<CurveTable, IoError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("curve.npy");
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
         bytes.extend((header.len() as u16 + 1).to_le_bytes());
         bytes.extend(header.as_bytes());
         bytes.push(b'\n');
         bytes.extend(data);
-        fs::write(&path, bytes).unwrap();
-        read(&path)
+        in_a_file("curve.npy", bytes, read)
     }
 
     #[test]

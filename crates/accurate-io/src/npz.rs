@@ -105,6 +105,7 @@ pub(crate) fn read(path: &Path) -> Result<CurveTable, IoError> {
 mod tests {
     use super::*;
     use crate::Column;
+    use crate::in_a_file::in_a_file;
     use accurate_geom::{LengthUnit, Point3};
     use ndarray_npy::NpzReader;
 
@@ -171,10 +172,7 @@ mod tests {
     }
 
     fn read_bytes_of(bytes: &[u8]) -> Result<CurveTable, IoError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.npz");
-        std::fs::write(&path, bytes).unwrap();
-        read(&path)
+        in_a_file("a.npz", bytes, read)
     }
 
     #[test]

@@ -165,6 +165,7 @@ fn malformed(path: &Path, error: &csv::Error) -> IoError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::in_a_file::in_a_file;
     use accurate_geom::View1;
     use std::fs;
 
@@ -189,10 +190,7 @@ mod tests {
     }
 
     fn read(text: &[u8]) -> Result<Vec<Pixel<View1>>, IoError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("points_L.csv");
-        fs::write(&path, text).unwrap();
-        read_points(&path)
+        in_a_file("points_L.csv", text, read_points)
     }
 
     #[test]

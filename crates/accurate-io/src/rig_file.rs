@@ -172,6 +172,7 @@ pub(crate) fn line_at(text: &str, offset: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::in_a_file::in_a_file;
     use std::fs;
 
     const GOOD: &str = r#"unit = "mm"
@@ -189,10 +190,7 @@ distortion = [0, 0, 0, 0, 0]
 "#;
 
     fn read(text: &str, name: &str) -> Result<Rig, IoError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(name);
-        fs::write(&path, text).unwrap();
-        read_rig(&path)
+        in_a_file(name, text, read_rig)
     }
 
     #[test]

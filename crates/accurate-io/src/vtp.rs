@@ -305,6 +305,7 @@ fn is_array(element: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::in_a_file::in_a_file;
 
     /// As VTK saves a file of ours again: indented, with empty sections, information keys and signed
     /// bytes.
@@ -356,10 +357,7 @@ mod tests {
 "#;
 
     fn read_text(text: &str) -> Result<CurveTable, IoError> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("curve.vtp");
-        std::fs::write(&path, text).unwrap();
-        read(&path)
+        in_a_file("curve.vtp", text, read)
     }
 
     #[test]

@@ -1,11 +1,9 @@
 use super::*;
+use crate::in_a_file::in_a_file;
 use std::fs;
 
 fn read_raw(bytes: &[u8]) -> Result<Vec<Point3>, IoError> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("truth.ply");
-    fs::write(&path, bytes).unwrap();
-    read_ply_points(&path)
+    in_a_file("truth.ply", bytes, read_ply_points)
 }
 
 #[test]
