@@ -25,8 +25,12 @@ const EXCLUSIVE: [&str; 2] = ["quiet", "verbose"];
 /// they are for and before the user's own.
 ///
 /// # Errors
-/// A file that cannot be read, is not TOML, or has a key that is no option.
+/// A file that cannot be read, is not TOML, or has a key that is no option; two files.
 pub fn expand(command: &Command, mut words: Vec<OsString>) -> Result<Vec<OsString>, Failure> {
+    if config_paths(&words).nth(1).is_some() {
+        return Err(Failure::new(Failure::USAGE, "--config is given twice")
+            .with_hint("one file, with a table for each command: `accurate config schema`"));
+    }
     let Some(path) = config_path(&words) else { return Ok(words) };
     let text = read_text(&path)?;
     let wrong = |problem: String| {
@@ -162,7 +166,11 @@ pub fn schema(command: &Command) -> Value {
 }
 
 pub fn config_path(words: &[OsString]) -> Option<PathBuf> {
-    words.iter().enumerate().skip(1).find_map(|(at, word)| {
+    config_paths(words).next()
+}
+
+fn config_paths(words: &[OsString]) -> impl Iterator<Item = PathBuf> + '_ {
+    words.iter().enumerate().skip(1).filter_map(|(at, word)| {
         let word = word.to_str()?;
         match word.strip_prefix("--config") {
             Some("") => words.get(at + 1).map(PathBuf::from),

@@ -57,18 +57,31 @@ pub fn places<'p>(files: impl IntoIterator<Item = &'p PathBuf>) -> BTreeSet<Path
     files.into_iter().filter_map(|path| path.canonicalize().ok()).collect()
 }
 
-/// Refuses an output file that stands at one of the [`places`] that are `read`.
+/// Refuses an output that stands at one of the [`places`] that are `read`, or among the files of a pair
+/// folder that is one of them or lies in one.
 ///
 /// # Errors
 /// [`Failure::USAGE`].
 pub fn refuse_what_is_read(written: &Path, read: &BTreeSet<PathBuf>) -> Result<(), Failure> {
-    if written.canonicalize().is_ok_and(|place| read.contains(&place)) {
+    let is_read = |place: &PathBuf| {
+        let in_a_folder = place.ancestors().skip(1).any(|folder| read.contains(folder));
+        read.contains(place) || (in_a_folder && is_of_a_pair(place))
+    };
+    if written.canonicalize().is_ok_and(|place| is_read(&place)) {
         let message = format!("{} is read, and would be replaced", written.display());
         return Err(
             Failure::new(Failure::USAGE, message).with_hint("give another place for the results")
         );
     }
     Ok(())
+}
+
+/// Whether a file has the name of one of a pair folder (`docs/conventions.md`).
+fn is_of_a_pair(place: &Path) -> bool {
+    const FOLDERS: [&str; 5] = ["annotations", "calibration", "images", "masks", "points"];
+    let folder = place.parent().and_then(Path::file_name);
+    place.file_name().is_some_and(|name| name == "meta.json")
+        || folder.is_some_and(|name| FOLDERS.iter().any(|known| name == *known))
 }
 
 /// Checks a place for an output file and makes its folder: what fails, fails before the work.

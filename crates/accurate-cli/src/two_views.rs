@@ -35,6 +35,28 @@ pub fn cameras_of(files: &[PathBuf], defaults: &ViewDefaults) -> Result<Vec<Name
     Ok(views)
 }
 
+/// The camera of a file: the one that has this name, or the only one.
+///
+/// # Errors
+/// [`Failure::USAGE`] without a view of the name, or without a name where there are more.
+pub fn one_view(
+    file: &Path,
+    name: Option<&str>,
+    defaults: &ViewDefaults,
+) -> Result<NamedView, Failure> {
+    let mut views = cameras_of(&[file.to_owned()], defaults)?;
+    if let Some(name) = name {
+        return named(&views, name).map_err(|failure| failure.of_file(file));
+    }
+    let names = names(&views);
+    let only = views.pop().filter(|_| views.is_empty());
+    only.ok_or_else(|| {
+        let message = format!("{}: more than one view", file.display());
+        Failure::new(Failure::USAGE, message)
+            .with_hint(format!("name one of them with --view: {names}"))
+    })
+}
+
 /// The two cameras of `files`: those that `wanted` names, in that order, or all there are.
 pub fn two_cameras(
     files: &[PathBuf],

@@ -33,14 +33,6 @@ impl Dataset {
             Self::Phantom => LengthUnit::Millimetre,
         }
     }
-
-    /// The unit the table prints: for the simulation it is not [`Dataset::unit`].
-    pub const fn printed_unit(self) -> &'static str {
-        match self {
-            Self::Simulation => "pixel",
-            Self::Phantom => "mm",
-        }
-    }
 }
 
 /// A column of the paper's Table 1.

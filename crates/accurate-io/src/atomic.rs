@@ -1,6 +1,6 @@
-use std::fs;
 #[cfg(unix)]
 use std::fs::File;
+use std::fs::{self, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
@@ -14,7 +14,8 @@ const SUFFIX: &str = ".accurate-tmp";
 /// Writes `path` so that a reader sees the old file or the new one, never a part.
 ///
 /// `write` fills a temporary file in the same folder, which is synced, renamed onto `path`, and the
-/// folder synced. The folder must exist.
+/// folder synced. The folder must exist. What a link leads to is replaced, not the link; a device or a
+/// pipe is written to as it is.
 ///
 /// # Errors
 /// [`IoError::System`] (or [`IoError::Missing`] for a missing folder). When `write` or anything
@@ -24,6 +25,14 @@ pub fn write_atomically(
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), IoError> {
     let system = |e| IoError::system(path, "write", e);
+    // A name that leads nowhere yet stays as it is.
+    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if fs::metadata(&place).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        let mut stream =
+            BufWriter::new(OpenOptions::new().write(true).open(&place).map_err(system)?);
+        return write(&mut stream).and_then(|()| stream.flush()).map_err(system);
+    }
+    let path = place.as_path();
     let name = path
         .file_name()
         .ok_or_else(|| system(io::Error::new(io::ErrorKind::InvalidInput, "not a file name")))?;
@@ -114,6 +123,43 @@ mod tests {
         fs::create_dir(&path).unwrap();
         assert!(write_atomically(&path, |w| w.write_all(b"x")).is_err());
         assert_eq!(names(folder.path()), ["taken"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_and_what_it_leads_to_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (real, link) = (folder.path().join("real.csv"), folder.path().join("link.csv"));
+        fs::write(&real, b"old").unwrap();
+        std::os::unix::fs::symlink(&real, &link).unwrap();
+        write_atomically(&link, |w| w.write_all(b"new")).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&real).unwrap(), b"new");
+        assert_eq!(names(folder.path()), ["link.csv", "real.csv"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_and_a_pipe_are_written_to_and_stay_what_they_are() {
+        use std::os::unix::fs::FileTypeExt;
+
+        let null = Path::new("/dev/null");
+        // Not a name of the device itself: what goes wrong here must not go wrong there.
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("null");
+        std::os::unix::fs::symlink(null, &link).unwrap();
+        write_atomically(&link, |w| w.write_all(b"gone")).unwrap();
+        assert!(fs::metadata(null).unwrap().file_type().is_char_device());
+
+        let pipe = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || fs::read(pipe).unwrap()
+        });
+        write_atomically(&pipe, |w| w.write_all(b"through")).unwrap();
+        assert_eq!(reader.join().unwrap(), b"through");
+        assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo());
     }
 
     #[test]

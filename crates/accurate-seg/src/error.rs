@@ -83,6 +83,12 @@ pub enum SegError {
         /// Its value.
         value: f64,
     },
+    /// By how much a piece may be fainter is negative or no number.
+    #[error("a piece may be fainter than the surest by {value} logits; expected 0 or more")]
+    BadFaintness {
+        /// The value.
+        value: f32,
+    },
     /// A threshold is NaN.
     #[error("threshold `{name}` is not a number")]
     LevelIsNan {

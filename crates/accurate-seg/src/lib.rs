@@ -2,6 +2,7 @@
 //!
 //! - [`binarise_fixed`], [`binarise_otsu`], [`binarise_hysteresis`]: grey values to a [`Mask`];
 //! - [`keep_largest`], [`remove_smaller_than`], [`Components`]: what belongs together;
+//! - [`without_faint_pieces`]: what a probability map is less sure of than of the body goes;
 //! - [`zhang_suen`] (as scikit-image's `skeletonize`), [`guo_hall`]: lines one pixel wide;
 //! - [`Polarity`]: whether the body is dark, as everything here takes it to be, or bright;
 //! - [`Segmenter`]: whatever finds the body in an image, with a [`Segmentation`] as its answer;
@@ -33,6 +34,7 @@ mod bit_image;
 mod components;
 mod distance;
 mod error;
+mod faint_pieces;
 mod gap_hints;
 mod mask;
 mod median;
@@ -45,6 +47,7 @@ mod segmentation;
 mod skeleton;
 mod spurs;
 mod strands;
+mod surety;
 mod thin;
 mod thin_rules;
 #[cfg(test)]
@@ -54,6 +57,7 @@ mod threshold;
 pub use components::{Components, keep_largest, remove_smaller_than};
 pub use distance::{distance_to_background, median_width_px};
 pub use error::SegError;
+pub use faint_pieces::without_faint_pieces;
 pub use gap_hints::{GapHint, GapParams, gap_hints};
 pub use mask::Mask;
 pub use polarity::Polarity;
@@ -62,5 +66,6 @@ pub use ridge::{RidgeParams, RidgePoint, median_ridge_width_px, ridge_centreline
 pub use segmentation::{Progress, Segmentation, Segmenter, Watch, unwatched};
 pub use skeleton::Skeleton;
 pub use strands::Strands;
+pub use surety::Surety;
 pub use thin::{guo_hall, zhang_suen};
 pub use threshold::{binarise_fixed, binarise_hysteresis, binarise_otsu, otsu_level};

@@ -2,8 +2,9 @@ use std::fmt;
 
 use ndarray::Array2;
 
+use crate::faint_pieces::require_faintness;
 use crate::spurs::without_spurs;
-use crate::{Components, Mask, SegError, binarise_hysteresis, zhang_suen};
+use crate::{Components, Mask, SegError, binarise_hysteresis, without_faint_pieces, zhang_suen};
 
 /// From the probability of the body to its mask.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,28 +21,46 @@ pub struct PostProcessing {
     pub high: f32,
     /// Pieces whose skeleton has fewer pixels are dropped, unless there is no longer one, px.
     pub min_length_px: usize,
+    /// Pieces are dropped that are fainter than the surest by more than this and go on from no other
+    /// ([`without_faint_pieces`]), difference of median logits, 0 or more; `None` keeps all.
+    pub max_faintness_logits: Option<f32>,
     /// Side branches that stick out of a strand by at most this are cut off, px; 0 keeps all.
     pub max_spur_px: usize,
 }
 
 impl fmt::Display for PostProcessing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { low, high, min_length_px, max_spur_px } = self;
+        let Self { low, high, min_length_px, max_faintness_logits, max_spur_px } = self;
         write!(f, "threshold {high} down to {low}, pieces from {min_length_px} px")?;
+        if let Some(logits) = max_faintness_logits {
+            write!(f, ", up to {logits} logits fainter")?;
+        }
         write!(f, ", spurs up to {max_spur_px} px cut")
     }
 }
 
 impl PostProcessing {
+    /// Most of what a network gives besides the body is fainter than the body by more than this, hardly
+    /// any piece of a body is that goes on from no other (images of seeds 1500 and 1501, pictures of
+    /// `carm`, seed 1103).
+    pub const FAINTNESS_LOGITS: f32 = 2.25;
     /// One threshold, everything kept: the paper's reading of a probability map.
-    pub const PAPER: Self = Self { low: 0.5, high: 0.5, min_length_px: 0, max_spur_px: 0 };
+    pub const PAPER: Self =
+        Self { low: 0.5, high: 0.5, min_length_px: 0, max_faintness_logits: None, max_spur_px: 0 };
     /// Ours. What a network gives besides the body is short and faint.
-    pub const DEFAULT: Self = Self { low: 0.3, high: 0.5, min_length_px: 12, max_spur_px: 4 };
+    pub const DEFAULT: Self = Self {
+        low: 0.3,
+        high: 0.5,
+        min_length_px: 12,
+        max_faintness_logits: Some(Self::FAINTNESS_LOGITS),
+        max_spur_px: 4,
+    };
 
     /// Refuses values outside their ranges.
     ///
     /// # Errors
-    /// [`SegError::LevelIsNan`], [`SegError::LevelsOutOfOrder`], [`SegError::LevelOutOfRange`].
+    /// [`SegError::LevelIsNan`], [`SegError::LevelsOutOfOrder`], [`SegError::LevelOutOfRange`],
+    /// [`SegError::BadFaintness`].
     pub fn check(&self) -> Result<(), SegError> {
         for (name, value) in [("low", self.low), ("high", self.high)] {
             if value.is_nan() {
@@ -54,7 +73,7 @@ impl PostProcessing {
         if self.low > self.high {
             return Err(SegError::LevelsOutOfOrder { low: self.low, high: self.high });
         }
-        Ok(())
+        self.max_faintness_logits.map_or(Ok(()), require_faintness)
     }
 
     /// The mask of a probability map, shape `(height, width)`. It may be empty.
@@ -64,11 +83,14 @@ impl PostProcessing {
     /// [`SegError::TooLarge`].
     ///
     /// # Cost
-    /// Thinning once for the lengths and once for the spurs.
+    /// Thinning once for the lengths, once for the faint pieces and once for the spurs.
     pub fn mask_of(&self, probability: &Array2<f32>) -> Result<Mask, SegError> {
         self.check()?;
         let mask = binarise_hysteresis(probability, self.low, self.high)?;
-        let mask = without_short_pieces(mask, self.min_length_px)?;
+        let mut mask = without_short_pieces(mask, self.min_length_px)?;
+        if let Some(logits) = self.max_faintness_logits {
+            mask = without_faint_pieces(&mask, probability, logits)?;
+        }
         without_spurs(&mask, self.max_spur_px)
     }
 }

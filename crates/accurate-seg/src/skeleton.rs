@@ -59,11 +59,6 @@ impl Skeleton {
         self.with_neighbours(|count| count == 1)
     }
 
-    /// [`Self::endpoints`] as positions in the image of view `V`: x = column, y = row.
-    pub fn endpoints_as<V: View>(&self) -> Vec<Pixel<V>> {
-        as_pixels(&self.endpoints())
-    }
-
     /// Pixels without a neighbour.
     pub fn isolated(&self) -> Vec<(usize, usize)> {
         self.with_neighbours(|count| count == 0)

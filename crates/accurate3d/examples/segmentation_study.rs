@@ -206,8 +206,13 @@ fn tune(seen: &[(Array2<f32>, Array2<bool>)]) -> Result<(), Box<dyn Error>> {
         for share in [0.4, 0.6, 0.8, 1.0] {
             for min_length_px in [0, 12, 20, 30] {
                 for max_spur_px in [0, 4, 8] {
-                    let post =
-                        PostProcessing { low: high * share, high, min_length_px, max_spur_px };
+                    let post = PostProcessing {
+                        low: high * share,
+                        high,
+                        min_length_px,
+                        max_spur_px,
+                        ..PostProcessing::DEFAULT
+                    };
                     all.push((Scores::of(seen, post)?, post));
                 }
             }

@@ -27,7 +27,8 @@ pub struct CarefulLook {
 /// whether the order of the strands is ambiguous ([`Suspicion::Ambiguous`]).
 ///
 /// # Errors
-/// As [`reconstruct`]; [`Error::Segmentation`] if `watch` ends the second segmentation.
+/// As [`reconstruct`]; [`Error::Segmentation`] if `watch` ends the second segmentation, or its engine
+/// fails.
 pub fn reconstruct_images(
     pair: &ViewPair,
     params: &Params,

@@ -107,7 +107,7 @@ pub enum Error {
     },
     /// No pair of walks through the two masks gives a curve.
     #[error(
-        "case {case}: no pair of walks gives a curve ({} and {} walks, {pairs} pairs compared)",
+        "case {case}: no walk, or no pair of them, gives a curve ({} and {} walks, {pairs} pairs compared)",
         walks[0], walks[1]
     )]
     NoCandidate {

@@ -33,7 +33,8 @@ pub struct MaskTrace {
 /// body.
 ///
 /// # Errors
-/// [`Error::Segmentation`] for a mask that shows no thin body, [`Error::Traversal`].
+/// [`Error::Segmentation`] for a mask that shows no thin body, [`Error::Traversal`],
+/// [`Error::NoCandidate`] for one along which no walk leads.
 ///
 /// # Cost
 /// Thinning and distances O(pixels), the search of walks, O(length) for the rest: 10 ms for 512 x 512 px.

@@ -106,8 +106,6 @@ impl Turn {
     }
 }
 
-/// Ordered points leave nothing to thinning: turned images give the same curve to the convergence of
-/// the fit, far below its own error.
 #[test]
 fn a_direction_that_the_match_leaves_open_is_told_by_the_fits() {
     // Whole pixels whose match is cheaper, by less than 0.01 px a point, against the truth.
@@ -141,6 +139,8 @@ fn a_doubtful_tip_is_not_left_out_with_all_before_it() {
     }
 }
 
+/// Ordered points leave nothing to thinning: turned images give the same curve to the convergence of
+/// the fit, far below its own error.
 #[test]
 fn turned_images_and_swapped_views_give_the_same_curve() {
     for (family, index) in [(Family::Medium, 0), (Family::Helix, 1), (Family::SimPaper, 2)] {

@@ -4,6 +4,7 @@ use accurate3d::table::{Format, ScoreKind};
 use accurate3d::{InputKind, Method};
 use clap::{Args, ValueEnum};
 
+use super::camera::StatedArgs;
 use super::{Disturbances, ModelArgs, PointsKind};
 
 #[derive(Debug, Args)]
@@ -24,6 +25,11 @@ pub struct EvalArgs {
     /// how far the curve's image lies from what that view shows.
     #[arg(long, value_name = "CAMERA", requires = "seen")]
     pub third: Option<PathBuf>,
+    /// Which view of that file, by name, where it holds more.
+    #[arg(long, value_name = "NAME", requires = "third")]
+    pub view: Option<String>,
+    #[command(flatten)]
+    pub stated: StatedArgs,
     /// What that view shows: a mask, or points (CSV).
     #[arg(long, value_name = "MASK|CSV", requires = "third")]
     pub seen: Option<PathBuf>,

@@ -4,7 +4,7 @@ use super::doctor;
 use crate::args::{CameraArgs, CameraCommand, CameraTarget, ConvertArgs};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::{make_folder, make_place};
+use crate::text::{make_folder, make_place, places, refuse_what_is_read};
 use crate::two_views::cameras_of;
 
 /// `accurate camera`: what camera files say, in one convention, and in another tool's.
@@ -82,6 +82,7 @@ fn convert(args: &ConvertArgs, console: &Console) -> Result<(), Failure> {
         let message = format!("{}: a rig of this kind ends in .{extension}", args.out.display());
         return Err(Failure::new(Failure::USAGE, message));
     }
+    refuse_what_is_read(&args.out, &places(&args.cameras.files))?;
     if format == CameraFormat::Colmap {
         make_folder(&args.out)?;
     } else {

@@ -15,7 +15,7 @@ use super::trace::cheapest_walk;
 use crate::args::DoctorArgs;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::{has_extension, make_place};
+use crate::text::{has_extension, make_place, places, refuse_what_is_read};
 use crate::two_views::two_cameras;
 
 /// `accurate camera doctor`: what is wrong with two cameras, by what was seen with them.
@@ -25,6 +25,8 @@ pub fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
             let message = format!("a rig is written as .toml or .json, not as {}", path.display());
             return Err(Failure::new(Failure::USAGE, message));
         }
+        let seen = [&args.matched, &args.points, &args.masks].into_iter().flatten();
+        refuse_what_is_read(path, &places(args.files.iter().chain(seen)))?;
         make_place(path)?;
     }
     let (views, seen) = examined(args)?;
@@ -112,6 +114,9 @@ fn of_files(args: &DoctorArgs, views: &[NamedView; 2]) -> Result<Option<Seen>, F
                     "matched points have as many rows; ordered points that are not matched go in with --points",
                 ));
             }
+            if one == two {
+                return Err(both_alike());
+            }
             pairs.extend(one.into_iter().zip(two).map(|(a, b)| [a, b]));
         }
         return Ok(Some(Seen::Matched(pairs)));
@@ -124,7 +129,15 @@ fn of_files(args: &DoctorArgs, views: &[NamedView; 2]) -> Result<Option<Seen>, F
         let [one, two] = [&files[0], &files[1]];
         curves.push([traced::<View1>(one, &views[0])?, traced::<View2>(two, &views[1])?]);
     }
+    if curves.iter().any(|[one, two]| one == two) {
+        return Err(both_alike());
+    }
     Ok((!curves.is_empty()).then_some(Seen::Curves(curves)))
+}
+
+fn both_alike() -> Failure {
+    Failure::new(Failure::USAGE, "what was seen is the same in both views")
+        .with_hint("two cameras never see the same: is one file named twice?")
 }
 
 /// Pair folders that share their cameras, and their points, or their masks where there are none.

@@ -2,9 +2,7 @@ use std::path::Path;
 
 use accurate3d::eval::{self, curve_scores, reprojection_rms};
 use accurate3d::geom::{LengthUnit, Point2, Point3, Polyline3, View1};
-use accurate3d::io::{
-    PairParts, Truth, ViewDefaults, read_curve, read_mask, read_pair, read_points,
-};
+use accurate3d::io::{NamedView, PairParts, Truth, read_curve, read_mask, read_pair, read_points};
 use accurate3d::seg::{Mask, Skeleton, zhang_suen};
 use serde_json::{Value, json};
 
@@ -12,7 +10,7 @@ use crate::args::EvalArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::text::has_extension;
-use crate::two_views::cameras_of;
+use crate::two_views::one_view;
 use crate::units::common_unit;
 
 /// `accurate eval`: the paper's scores and the point-to-polyline ones, as JSON.
@@ -47,7 +45,8 @@ pub fn run(args: &EvalArgs, console: &Console) -> Result<(), Failure> {
         scores["reprojection_rms_px"] = json!([rms.view1_px, rms.view2_px]);
     }
     if let (Some(camera), Some(seen)) = (&args.third, &args.seen) {
-        scores["third_view"] = third_view(&curve.points, unit, camera, seen, spacing)?;
+        let view = one_view(camera, args.view.as_deref(), &args.stated.defaults())?;
+        scores["third_view"] = third_view(&curve.points, unit, (camera, &view), seen, spacing)?;
     }
     scores["unit"] = json!(unit.label());
     console.json(&scores)
@@ -57,15 +56,10 @@ pub fn run(args: &EvalArgs, console: &Console) -> Result<(), Failure> {
 fn third_view(
     curve: &[Point3],
     unit: LengthUnit,
-    camera: &Path,
+    (camera, view): (&Path, &NamedView),
     seen: &Path,
     spacing: f64,
 ) -> Result<Value, Failure> {
-    let views = cameras_of(&[camera.to_owned()], &ViewDefaults::default())?;
-    let [view] = views.as_slice() else {
-        let message = format!("{}: {} views; expected one", camera.display(), views.len());
-        return Err(Failure::new(Failure::USAGE, message));
-    };
     common_unit(("the curve", unit), ("the third view", view.unit))?;
     let is_csv = has_extension(seen, "csv");
     let shown: Vec<Point2> = if is_csv {

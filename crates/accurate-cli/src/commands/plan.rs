@@ -10,8 +10,8 @@ use crate::args::PlanArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::raster::{is_picture, write_picture};
-use crate::text::{make_place, write_text};
-use crate::two_views::{cameras_of, named};
+use crate::text::{make_place, places, refuse_what_is_read, write_text};
+use crate::two_views::one_view;
 use crate::units::common_unit;
 
 /// Views that are printed.
@@ -27,9 +27,10 @@ pub fn run(args: &PlanArgs, console: &Console) -> Result<(), Failure> {
                 format!("a plan is written as .svg, .png or .csv, not {}", path.display());
             return Err(Failure::new(Failure::USAGE, message));
         }
+        refuse_what_is_read(path, &places([&args.shape, &args.first]))?;
         make_place(path)?;
     }
-    let view = first_view(args)?;
+    let view = one_view(&args.first, args.view.as_deref(), &args.stated.defaults())?;
     let shape = read_curve(&args.shape)?;
     let unit = common_unit(("the shape", shape.unit), ("the first view", view.unit))?;
     let params = PlanParams {
@@ -40,13 +41,6 @@ pub fn run(args: &PlanArgs, console: &Console) -> Result<(), Failure> {
         ..PlanParams::DEFAULT
     };
     let plan = plan_views(&shape.points, &view.camera, &params)?;
-    for path in &args.out {
-        if is_csv(path) {
-            write_text(path, &csv(&plan, unit))?;
-        } else {
-            write_picture(path, &heat_map_svg(&plan, unit), PNG_SCALE)?;
-        }
-    }
     let ranked = plan.ranked();
     if ranked.is_empty() {
         return Err(Failure::new(
@@ -54,6 +48,13 @@ pub fn run(args: &PlanArgs, console: &Console) -> Result<(), Failure> {
             "no second view in these ranges sees all of the shape in depth",
         )
         .with_hint("widen --primary and --secondary, or give the part of the body that matters"));
+    }
+    for path in &args.out {
+        if is_csv(path) {
+            write_text(path, &csv(&plan, unit))?;
+        } else {
+            write_picture(path, &heat_map_svg(&plan, unit), PNG_SCALE)?;
+        }
     }
     if console.json {
         return console.json(&as_json(&plan, &ranked, unit, &view));
@@ -68,20 +69,6 @@ pub fn run(args: &PlanArgs, console: &Console) -> Result<(), Failure> {
     }
     console.remark(NOT_FOR_CLINICAL_USE);
     Ok(())
-}
-
-fn first_view(args: &PlanArgs) -> Result<NamedView, Failure> {
-    let mut views = cameras_of(std::slice::from_ref(&args.first), &args.stated.defaults())?;
-    if let Some(name) = &args.view {
-        return named(&views, name).map_err(|failure| failure.of_file(&args.first));
-    }
-    let names = views.iter().map(|v| v.name.clone()).collect::<Vec<_>>().join(", ");
-    let first = views.pop().filter(|_| views.is_empty());
-    first.ok_or_else(|| {
-        let message = format!("{}: more than one view", args.first.display());
-        Failure::new(Failure::USAGE, message)
-            .with_hint(format!("name one of them with --view: {names}"))
-    })
 }
 
 fn is_csv(path: &Path) -> bool {

@@ -65,6 +65,9 @@ pub fn run(args: &ReconstructArgs, config: &str, console: &Console) -> Result<()
                 } else {
                     console.data(&done.line)?;
                 }
+                if let Some(remark) = &done.remark {
+                    console.remark(remark);
+                }
                 suspect.extend(done.suspect);
             }
             Err(failure) => {
@@ -135,6 +138,8 @@ fn refuse_what_takes_no_effect(args: &ReconstructArgs) -> Result<(), Failure> {
 
 /// A written result.
 struct Done {
+    /// What a reader should know beside.
+    remark: Option<String>,
     /// One line for a reader.
     line: String,
     /// The same as `result.json`.
@@ -164,7 +169,12 @@ fn jobs(args: &ReconstructArgs, config: &str) -> Result<Vec<(Source, Outputs)>, 
     }
     let mut pairs = Vec::new();
     for path in &args.inputs {
-        pairs.extend(find_pairs(path)?);
+        match find_pairs(path) {
+            Ok(found) => pairs.extend(found),
+            // Told when its turn comes: it does not stop the others.
+            Err(_) if args.inputs.len() > 1 => pairs.push(path.clone()),
+            Err(error) => return Err(error.into()),
+        }
     }
     if let [only] = pairs.as_slice()
         && args.inputs.first() == Some(only)
@@ -205,6 +215,8 @@ struct Read {
     pair: ViewPair,
     shown: String,
     inputs: Vec<Value>,
+    /// Why the report does not show all of the pair.
+    left_out: Option<String>,
 }
 
 /// Refuses points that are no curve yet.
@@ -260,7 +272,8 @@ fn read(source: &Source, args: &ReconstructArgs, has_report: bool) -> Result<Rea
                 inputs.push(json!({"file": file.display().to_string(), "blake3": hash}));
             }
             let names: Vec<String> = args.inputs.iter().map(|p| p.display().to_string()).collect();
-            return Ok(Read { pair: pair.into(), shown: names.join(", "), inputs });
+            let shown = names.join(", ");
+            return Ok(Read { pair: pair.into(), shown, inputs, left_out: None });
         }
     };
     let parts = PairParts {
@@ -275,8 +288,13 @@ fn read(source: &Source, args: &ReconstructArgs, has_report: bool) -> Result<Rea
         images: parts.images || (has_report && dir.join("images").is_dir()),
         ..parts
     };
-    let pair = ViewPair::from(read_pair(dir, more)?);
-    Ok(Read { pair, shown: dir.display().to_string(), inputs: hashed(dir, parts)? })
+    let (pair, left_out) = match read_pair(dir, more) {
+        // What the method does not read is no reason to fail.
+        Err(error) if more != parts => (read_pair(dir, parts)?, Some(error.to_string())),
+        pair => (pair?, None),
+    };
+    let (pair, shown) = (ViewPair::from(pair), dir.display().to_string());
+    Ok(Read { pair, shown, inputs: hashed(dir, parts)?, left_out })
 }
 
 /// The files that a pair folder's parts lie in, with their hashes.
@@ -295,7 +313,7 @@ fn one(
     segmenter: Option<&NetworkSegmenter>,
     watch: &Watch<'_>,
 ) -> Result<Done, Failure> {
-    let Read { mut pair, shown, inputs } = read(source, args, out.has_report())?;
+    let Read { mut pair, shown, inputs, left_out } = read(source, args, out.has_report())?;
     let polarity = args.grey.polarity();
     pair.images = pair.images.map(|both| both.map(|image| polarity.with_body_dark(image)));
     check_points(&pair)?;
@@ -320,7 +338,9 @@ fn one(
     }
     out.write(&pair, &reconstruction, &result)?;
     let doubted = !reconstruction.diagnostics.suspicions.is_empty();
+    let remark = left_out.map(|why| format!("{}: the report shows less: {why}", reconstruction.id));
     Ok(Done {
+        remark,
         line: summary(&reconstruction),
         json: result,
         suspect: doubted.then(|| reconstruction.id.clone()),

@@ -16,7 +16,7 @@ use crate::console::Console;
 use crate::dicom_child::read_picture;
 use crate::failure::Failure;
 use crate::segmentation::segmenter_with;
-use crate::text::{has_extension, make_folder, write_text};
+use crate::text::{has_extension, make_folder, places, refuse_what_is_read, write_text};
 
 /// Part of `--threshold` down to which connected pixels are taken: the default's 0.3 of 0.5.
 const WEAK: f32 = 0.6;
@@ -25,6 +25,10 @@ const WEAK: f32 = 0.6;
 /// the others.
 pub fn run(args: &SegmentArgs, console: &Console) -> Result<(), Failure> {
     let jobs = jobs(args)?;
+    let read = places(&args.images);
+    let mut written =
+        jobs.iter().flat_map(|job| OUTPUTS.map(|output| job.output(&args.out, output)));
+    written.try_for_each(|file| refuse_what_is_read(&file, &read))?;
     let polarity = args.grey.polarity();
     let segmenter = segmenter_with(&args.model, console, |options, own| NetworkOptions {
         postprocessing: args.threshold.map(|high| PostProcessing { low: WEAK * high, high, ..own }),
@@ -64,6 +68,15 @@ struct Job {
     name: String,
     /// What is taken of a DICOM run; none of other images.
     frame: Option<FrameChoice>,
+}
+
+/// What the names of the outputs of an image end with.
+const OUTPUTS: [&str; 4] = ["mask.png", "probability.png", "overlay.png", "centreline.csv"];
+
+impl Job {
+    fn output(&self, folder: &Path, ends: &str) -> PathBuf {
+        folder.join(format!("{}_{ends}", self.name))
+    }
 }
 
 fn jobs(args: &SegmentArgs) -> Result<Vec<Job>, Failure> {
@@ -119,7 +132,7 @@ fn one(
     segmenter: &NetworkSegmenter,
     watch: &Watch<'_>,
 ) -> Result<Value, Failure> {
-    let Job { image: path, name, frame } = job;
+    let Job { image: path, frame, .. } = job;
     let image = read_picture(path, frame.is_some(), frame.unwrap_or(FrameChoice::Mean))?;
     let frame = match frame {
         None => Value::Null,
@@ -133,13 +146,12 @@ fn one(
     let ridge = ridge_centreline(&found.probability, &skeleton, &params)?;
     let pieces = Components::of(&found.mask)?.sizes().len();
     // Nothing that can fail but the disk comes after the first file.
-    let file = |what: &str| out.join(format!("{name}_{what}.png"));
-    write_mask(&file("mask"), found.mask.as_array())?;
+    let [mask, probability, drawn, centreline] = OUTPUTS.map(|output| job.output(out, output));
+    write_mask(&mask, found.mask.as_array())?;
     // 0 to 1 becomes 0 to 65 535.
     let sixteen = found.probability.mapv(|p| (p * 65_535.0).round() as u16);
-    write_u16(&file("probability"), &sixteen)?;
-    write_rgb(&file("overlay"), &overlay(&image, &skeleton))?;
-    let centreline = out.join(format!("{name}_centreline.csv"));
+    write_u16(&probability, &sixteen)?;
+    write_rgb(&drawn, &overlay(&image, &skeleton))?;
     write_text(&centreline, &centreline_csv(&ridge))?;
     let (height, columns) = image.dim();
     Ok(json!({
@@ -151,9 +163,9 @@ fn one(
         "pieces": pieces,
         "median_width_px": width,
         "median_ridge_width_px": median_ridge_width_px(&ridge),
-        "mask": file("mask").display().to_string(),
-        "probability": file("probability").display().to_string(),
-        "overlay": file("overlay").display().to_string(),
+        "mask": mask.display().to_string(),
+        "probability": probability.display().to_string(),
+        "overlay": drawn.display().to_string(),
         "centreline": centreline.display().to_string(),
         "segmentation": segmenter.describe(),
         "note": NOT_FOR_CLINICAL_USE,

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::args::{XrayArgs, XrayGenerator};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::{has_extension, make_place};
+use crate::text::{has_extension, make_place, places, refuse_what_is_read};
 
 /// Name of the list of a folder of shards.
 const LIST: &str = "shards.json";
@@ -47,6 +47,7 @@ pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
                 format!("--count {}: a sheet holds at most {MOST_ON_A_SHEET} images", args.count);
             return Err(Failure::new(Failure::USAGE, message));
         }
+        refuse_what_is_read(path, &places(&args.onto))?;
         make_place(path)?;
     }
     let backgrounds: Vec<_> =

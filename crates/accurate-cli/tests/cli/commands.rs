@@ -81,6 +81,62 @@ fn the_same_bytes_for_any_number_of_threads() {
     assert_eq!(one, run("8"));
 }
 
+/// Of one pair, the views and the fits are done side by side; of several, the pairs are. This one is looked
+/// at with the most care, and on images fitted to the grey levels.
+#[test]
+fn the_same_bytes_of_one_pair_in_doubt_for_any_number_of_threads() {
+    let dir = TempDir::new().unwrap();
+    let set = dir.path().join("set");
+    let mut synth = accurate();
+    synth.args(["synth", "carm", "--seed", "1000", "--count", "7", "--xray", "-o"]).arg(&set);
+    synth.assert().success();
+    for (input, more) in [("mask", [].as_slice()), ("image", &["--refine-calibration"])] {
+        let run = |threads: &str| {
+            let out = dir.path().join(format!("{input}-{threads}"));
+            accurate()
+                .args(["reconstruct", "--input", input, "--threads", threads, "--out"])
+                .arg(&out)
+                .arg(set.join("case_006"))
+                .args(more)
+                .env_remove("ORT_DYLIB_PATH")
+                .assert()
+                .success();
+            ["curve.csv", "result.json"].map(|file| fs::read_to_string(out.join(file)).unwrap())
+        };
+        let one = run("1");
+        let result: Value = serde_json::from_str(&one[1]).unwrap();
+        let found = &result["diagnostics"];
+        let with_care = match input {
+            "mask" => found["outline"]["fits"].as_u64().unwrap() > 50,
+            _ => !found["grey_levels"].is_null(),
+        };
+        assert!(with_care, "{input}: {found}");
+        assert_eq!(one, run("2"), "{input}");
+        assert_eq!(one, run("8"), "{input}");
+    }
+}
+
+#[test]
+fn the_camera_of_a_third_view_may_be_one_of_several_in_its_file() {
+    let bend = samples().join("bend");
+    let truth = bend.join("annotations/guidewire_3D.ply");
+    let eval = |more: &[&str]| {
+        let mut command = accurate();
+        command.arg("eval").arg(&truth).arg("--truth").arg(&truth).arg("--third").arg(&bend);
+        command.arg("--seen").arg(bend.join("masks/mask_R.png")).args(more);
+        command
+    };
+    let (code, message) = failure(&mut eval(&[]));
+    assert!(code == 2 && message.contains("--view: easy-2026-001_1, easy-2026-001_2"), "{message}");
+    let scores = |view: &str| -> Value {
+        serde_json::from_str(&stdout(&mut eval(&["--view", view]))).unwrap()
+    };
+    let mean = |scores: Value| scores["third_view"]["mean_px"].as_f64().unwrap();
+    // The truth lies in the middle of its own image and beside the other one.
+    let (own, other) = (mean(scores("easy-2026-001_2")), mean(scores("easy-2026-001_1")));
+    assert!(own < 1.0 && other > 5.0, "{own} {other}");
+}
+
 #[test]
 fn extra_formats_hold_the_same_curve() {
     let dir = TempDir::new().unwrap();

@@ -95,6 +95,33 @@ fn every_case_of_a_batch_has_its_own_config() {
 }
 
 #[test]
+fn a_report_leaves_out_what_cannot_be_read_and_says_so() {
+    let dir = TempDir::new().unwrap();
+    let pair = copy_of("bend", dir.path());
+    fs::remove_file(pair.join("masks/mask_R.png")).unwrap();
+    let (out, report) = (dir.path().join("out"), dir.path().join("report.html"));
+    let mut command = accurate();
+    command.args(["reconstruct", "-i", "points", "--report"]).arg(&report).arg("-o").arg(&out);
+    let done = command.arg(&pair).assert().success();
+    let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    assert!(said.contains("the report shows less") && said.contains("mask_R.png"), "{said}");
+    assert!(report.is_file() && out.join("curve.csv").is_file());
+}
+
+#[test]
+fn a_folder_that_is_no_pair_does_not_stop_the_others() {
+    let dir = TempDir::new().unwrap();
+    let (empty, out) = (dir.path().join("empty"), dir.path().join("out"));
+    fs::create_dir(&empty).unwrap();
+    let mut command = accurate();
+    command.args(["reconstruct", "-i", "points"]).arg(samples().join("bend")).arg(&empty);
+    let (code, message) = failure(command.arg(dir.path().join("nowhere")).arg("-o").arg(&out));
+    assert!(code != 0 && message.contains("2 of 3 pairs failed"), "{code} {message}");
+    assert!(message.contains("empty") && message.contains("nowhere"), "{message}");
+    assert!(out.join("bend/curve.csv").is_file());
+}
+
+#[test]
 fn what_is_read_is_not_replaced() {
     let dir = TempDir::new().unwrap();
     let pair = samples().join("bend");

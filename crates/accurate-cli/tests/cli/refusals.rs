@@ -239,6 +239,60 @@ fn what_is_read_is_never_replaced() {
     assert_eq!(fs::read(&mask).unwrap(), before);
 }
 
+/// Of every command that writes a file.
+#[test]
+fn no_command_replaces_what_it_reads() {
+    let dir = TempDir::new().unwrap();
+    let pair = copy_of("bend", dir.path());
+    let at = |file: &str| pair.join(file).display().to_string();
+    let (rig, network) = (dir.path().join("rig.toml"), dir.path().join("net.onnx"));
+    accurate()
+        .args(["camera", "convert", "--to", "rig-toml", "-o"])
+        .arg(&rig)
+        .arg(&pair)
+        .assert()
+        .success();
+    fs::write(&network, "no network").unwrap();
+    fs::copy(at("masks/mask_L.png"), at("masks/a.png")).unwrap();
+    fs::copy(at("masks/mask_R.png"), at("masks/a_mask.png")).unwrap();
+    let [rig, network] = [&rig, &network].map(|path| path.display().to_string());
+    let (folder, set) = (at(""), dir.path().display().to_string());
+    let [left, right, k] = ["masks/mask_L.png", "masks/mask_R.png", "calibration/K_L.txt"].map(at);
+    let shape = dir.path().join("shape.csv").display().to_string();
+    write(PathBuf::from(&shape), "x,y,z\n0,0,0\n1,1,1\n");
+    let (a, a_mask, masks, meta) =
+        (at("masks/a.png"), at("masks/a_mask.png"), at("masks"), at("meta.json"));
+    for (words, file) in [
+        (vec!["segment", &a, &a_mask, "-o", &masks], &a_mask),
+        (vec!["figure", "gctt", &folder, "-o", &left], &left),
+        (vec!["table", "--set", &set, "-o", &meta], &meta),
+        (vec!["table", "--set", &set, "--per-case", &meta], &meta),
+        (vec!["camera", "convert", &folder, "--to", "p-txt", "-o", &k], &k),
+        (vec!["camera", "doctor", &rig, "--masks", &left, &right, "-o", &rig], &rig),
+        (vec!["plan-views", "--shape", &shape, "--first", &rig, "-o", &shape], &shape),
+        (vec!["model", "pack", &network, "--manifest", &rig, "-o", &network], &network),
+        (vec!["synth", "xray", "--onto", &left, "--sheet", &left], &left),
+    ] {
+        let before = fs::read(file).unwrap();
+        let (code, message) = failure(accurate().args(&words));
+        assert!(code == 2, "{words:?}: {code} {message}");
+        assert!(message.contains("would be replaced"), "{words:?}: {message}");
+        assert_eq!(&fs::read(file).unwrap(), &before, "{words:?}");
+    }
+}
+
+#[test]
+fn two_config_files_are_refused() {
+    let dir = TempDir::new().unwrap();
+    let config = dir.path().join("lab.toml");
+    write(config.clone(), "quiet = true\n");
+    let mut command = accurate();
+    command.arg("--config").arg(&config).args(["reconstruct", "-o"]).arg(dir.path().join("out"));
+    command.arg(samples().join("bend")).args(["--config", "nowhere.toml"]);
+    let (code, message) = failure(&mut command);
+    assert!(code == 2 && message.contains("--config is given twice"), "{code} {message}");
+}
+
 #[test]
 fn one_view_in_the_place_of_both_is_refused() {
     let same = |file: [&'static str; 2]| {

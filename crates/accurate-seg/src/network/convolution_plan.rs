@@ -94,10 +94,26 @@ fn joined(makers: &Makers<'_>, name: &str) -> Vec<String> {
     let is_channels = |node: &NodeProto| {
         node.attribute.iter().any(|a| a.name == "axis" && (a.i == 1 || a.i == -3))
     };
+    let name = unchanged(makers, name);
     match makers.get(name) {
-        Some(node) if node.op_type == "Concat" && is_channels(node) => node.input.clone(),
+        Some(node) if node.op_type == "Concat" && is_channels(node) => {
+            node.input.iter().map(|name| unchanged(makers, name).to_owned()).collect()
+        }
         _ => vec![name.to_owned()],
     }
+}
+
+/// The value that an activation is a copy of. rten does without the copies, and can be asked for none; all
+/// activations are float32 already.
+fn unchanged<'g>(makers: &Makers<'g>, mut name: &'g str) -> &'g str {
+    let copied = |name: &str| {
+        let copy = makers.get(name).filter(|n| n.op_type == "Identity" || n.op_type == "Cast");
+        copy.and_then(|node| node.input.first())
+    };
+    while let Some(original) = copied(name) {
+        name = original;
+    }
+    name
 }
 
 /// The tensor that a weight is cast from, or the weight.

@@ -8,8 +8,8 @@ use crate::threshold::require_finite;
 /// mean far from 0.
 ///
 /// # Errors
-/// [`SegError::EmptyImage`], [`SegError::NotFinite`], [`SegError::Constant`] where the scheme
-/// divides by a spread and every pixel is the same.
+/// [`SegError::EmptyImage`], [`SegError::NotFinite`], [`SegError::Constant`] if every
+/// pixel is the same.
 pub(super) fn normalise(
     image: &Array2<f32>,
     scheme: Normalisation,

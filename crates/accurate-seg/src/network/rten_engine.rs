@@ -208,6 +208,8 @@ impl fmt::Debug for RtenEngine {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Manifest;
+    use super::super::onnx_proto::NodeProto;
     use super::*;
 
     /// What rten would compute instead takes twice as long and says nothing.
@@ -229,6 +231,62 @@ mod tests {
                 all.iter().filter(|(of, _)| *of == k).map(|(_, last)| last).collect();
             assert!(!uses.is_empty() && uses.iter().filter(|last| ***last).count() == 1, "{k}");
             assert!(*uses[uses.len() - 1], "{k}");
+        }
+    }
+
+    /// The network with a copy of every value that a convolution or a concatenation takes, and of what it
+    /// gives.
+    fn with_copies(network: &[u8], output: &str) -> Vec<u8> {
+        let mut model = ModelProto::decode(network).unwrap();
+        let graph = model.graph.as_mut().unwrap();
+        let mut nodes = Vec::new();
+        let copy = |from: &str, to: &str| NodeProto {
+            op_type: "Identity".to_owned(),
+            input: vec![from.to_owned()],
+            output: vec![to.to_owned()],
+            ..NodeProto::default()
+        };
+        for mut node in std::mem::take(&mut graph.node) {
+            let values = match node.op_type.as_str() {
+                "Conv" => 1,
+                "Concat" => node.input.len(),
+                _ => 0,
+            };
+            for (k, name) in node.input.iter_mut().take(values).enumerate() {
+                let copied = format!("{name}_copied_{}_{k}", nodes.len());
+                nodes.push(copy(name, &copied));
+                *name = copied;
+            }
+            let gives = node.output[0] == output;
+            if gives {
+                node.output[0] = "original".to_owned();
+            }
+            nodes.push(node);
+            if gives {
+                nodes.push(copy("original", output));
+            }
+        }
+        graph.node = nodes;
+        model.encode_to_vec()
+    }
+
+    #[test]
+    fn copies_of_values_change_nothing() {
+        for network in [
+            &include_bytes!("../../tests/fixtures/unet.onnx")[..],
+            &include_bytes!("../../tests/fixtures/dark.onnx")[..],
+        ] {
+            let manifest = include_bytes!("../../tests/fixtures/dark.json");
+            let manifest = Manifest::from_json(manifest).unwrap();
+            let copied = with_copies(network, &manifest.network.output);
+            let image = Array2::from_shape_fn((16, 24), |(y, x)| ((7 * y + 3 * x) % 11) as f32);
+            let [plain, copied] = [network.to_vec(), copied].map(|network| {
+                let bundle = ModelBundle::new(manifest.clone(), network.into()).unwrap();
+                let engine = RtenEngine::new(&bundle, 1).unwrap();
+                (engine.convolutions.len(), engine.logits(&image).unwrap())
+            });
+            assert!(plain.0 > 0);
+            assert_eq!(plain, copied);
         }
     }
 

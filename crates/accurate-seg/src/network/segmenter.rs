@@ -55,8 +55,8 @@ impl NetworkSegmenter {
     /// The engine must run the bundle's network.
     ///
     /// # Errors
-    /// [`SegError::LevelIsNan`], [`SegError::LevelsOutOfOrder`], [`SegError::LevelOutOfRange`] for
-    /// bad options.
+    /// [`SegError::LevelIsNan`], [`SegError::LevelsOutOfOrder`], [`SegError::LevelOutOfRange`],
+    /// [`SegError::BadFaintness`] for bad options.
     pub fn new(
         bundle: &ModelBundle,
         engine: Box<dyn Engine>,

@@ -60,7 +60,11 @@ pub(crate) fn closed_points(
     let adjusted = Adjusted { points, covariances, rig: &rig, matched, adjustment };
     let mut result = adjusted.into_reconstruction(pair, params, (points1, points2))?;
     result.diagnostics.closed = true;
-    result.diagnostics.suspicions.extend((*lead < CLEAR_LEAD).then_some(Suspicion::Ambiguous));
+    // Which way round is told by the fits, not by what the match leaves out of a curve that has no ends.
+    let reasons = &mut result.diagnostics.suspicions;
+    reasons.retain(|reason| *reason != Suspicion::Ambiguous);
+    reasons.extend((*lead < CLEAR_LEAD).then_some(Suspicion::Ambiguous));
+    reasons.sort_unstable();
     Ok(result)
 }
 

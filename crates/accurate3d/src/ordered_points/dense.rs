@@ -7,13 +7,21 @@ const SPARSE_PX: f64 = 2.0;
 /// Fewer points draw no body.
 const FEWEST: usize = 4;
 
+/// Longest curve that is filled, px: no image shows a longer one.
+const LONGEST_PX: f64 = 1e6;
+
 /// Vertices farther apart than the matcher's steps, with points at most 1 px apart put between them along
-/// the chords; `None` if they are near enough, or too few.
+/// the chords; `None` if they are near enough, too few, or longer than any image shows.
 pub(super) fn densified<V: View>(points: &[Pixel<V>]) -> Option<Vec<Pixel<V>>> {
     if points.len() < FEWEST {
         return None;
     }
     let mut lengths: Vec<f64> = points.windows(2).map(|w| w[0].distance(w[1])).collect();
+    // A point that is not finite is refused by the matcher.
+    let length: f64 = lengths.iter().sum();
+    if !(length <= LONGEST_PX) {
+        return None;
+    }
     lengths.sort_unstable_by(f64::total_cmp);
     if lengths.get(lengths.len() / 2).is_none_or(|median| *median <= SPARSE_PX) {
         return None;
@@ -71,5 +79,14 @@ mod tests {
         assert!(densified(&row).is_none());
         let few: Vec<Pixel<View1>> = (0..3).map(|k| Pixel::new(f64::from(k) * 50.0, 3.0)).collect();
         assert!(densified(&row[..1]).is_none() && densified(&few).is_none());
+    }
+
+    #[test]
+    fn points_that_no_image_shows_are_left_to_the_matcher() {
+        for far in [f64::INFINITY, f64::NAN, 1e12] {
+            let xs = [0.0, 5.0, 10.0, far];
+            let points: Vec<Pixel<View1>> = xs.iter().map(|x| Pixel::new(*x, 0.0)).collect();
+            assert!(densified(&points).is_none(), "{far}");
+        }
     }
 }

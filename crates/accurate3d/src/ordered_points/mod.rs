@@ -68,7 +68,7 @@ pub(crate) fn adjusted_points(pair: &ViewPair, params: &Params) -> Result<Recons
 }
 
 /// What was found under the given calibration and the rig that it holds under: if the fit estimates
-/// another calibration, it is found once more under that, unless nothing can be fitted there. What is
+/// another calibration, it is found once more under that, unless nothing can be matched and fitted there. What is
 /// estimated stays relative to the given one.
 fn under_better_calibration<T, E>(
     given: &Rig,
@@ -78,9 +78,9 @@ fn under_better_calibration<T, E>(
     let corrected = |found: &T| fit(found)?.calibration?.correct(given).ok();
     let found = found_under(given)?;
     let Some(better) = corrected(&found) else { return Ok((found, given.clone())) };
-    let again = found_under(&better)?;
-    Ok(match corrected(&again) {
-        Some(rig) => (again, rig),
+    let again = found_under(&better).ok();
+    Ok(match again.and_then(|again| corrected(&again).map(|rig| (again, rig))) {
+        Some(again) => again,
         None => (found, better),
     })
 }

@@ -124,7 +124,7 @@ impl RobustParams {
         self.min_fits.min(self.enough_fits)
     }
 
-    /// Refuses weights and priors that nothing can be compared by.
+    /// Refuses weights and priors that nothing can be compared by, and a search that fits nothing.
     pub(crate) fn validate(&self) -> Result<(), FitError> {
         for (name, value) in [
             ("contenders", self.contenders),
@@ -138,6 +138,11 @@ impl RobustParams {
         ] {
             if !(value >= 0.0 && value.is_finite()) {
                 return Err(FitError::BadParameter { name, value });
+            }
+        }
+        for (name, value) in [("max_fits", self.max_fits), ("finalists", self.finalists)] {
+            if value == 0 {
+                return Err(FitError::BadParameter { name, value: 0.0 });
             }
         }
         self.calibration.map_or(Ok(()), |priors| priors.validate())

@@ -89,8 +89,13 @@ impl Seen {
 
     /// What bears on the choice, the curves of all looks among it.
     pub(crate) fn evidence(&self) -> Evidence {
-        let best = self.settled.fits[0].unlikeliness();
-        let behind = self.rivals().map(|rival| rival.unlikeliness() - best);
+        let best = &self.settled.fits[0];
+        // Without a last fit there is no likelihood.
+        let behind = |rival: &Candidate| match best.unlikeliness() {
+            least if least.is_finite() => rival.unlikeliness() - least,
+            _ => rival.score - best.score,
+        };
+        let behind = self.rivals().map(behind).filter(|behind| behind.is_finite());
         let margin = behind.chain(self.settled.evidence.margin).min_by(f64::total_cmp);
         Evidence { margin, ..self.settled.evidence }
     }

@@ -1,5 +1,7 @@
 use accurate_geom::{EpipolarAngle, Pixel, Rig, View, View1, View2};
-use accurate_seg::{Components, Mask, SegError, Skeleton, Strands};
+use accurate_seg::{
+    Components, Mask, PostProcessing, SegError, Skeleton, Strands, Surety, without_faint_pieces,
+};
 use ndarray::Array2;
 
 use crate::Error;
@@ -8,13 +10,6 @@ use crate::Error;
 const PLANE_DISTANCE_PX: f64 = 1.5;
 /// A piece or strand is a stray if so much of it disagrees with the other view, and ceases to without it.
 const DISAGREEING: f64 = 0.5;
-/// A piece whose median logit is this far below that of the surest long piece of its view is a stray. On
-/// ten generated pairs (`carm`, seed 1, whose backgrounds show vessels) most pieces of vessels lay
-/// farther below the wire than that; a few did not, and are left to the other view.
-const FAINTER: f64 = 2.0;
-/// Of pieces at least this long, as part of the longest: where a wire lies upon itself it is darkest,
-/// and what is a small loop of it says little about the rest.
-const LONG_PIECE: f64 = 0.25;
 /// A strand of a piece is a stray only if its median logit is this far below that of the surest strand
 /// of its view, and the other view shows nothing at all along so much of it ([`ALONE`]): strands of a
 /// body that lie one upon the other in one view face more strands in the other, but not none. Of 378
@@ -23,8 +18,6 @@ const FAINTER_STRAND: f64 = 0.5;
 const ALONE: f64 = 0.3;
 /// Shorter strands are what thinning leaves around crossings, px of skeleton.
 const STRAND_PX: usize = 10;
-/// Nearer to 0 or 1 a probability of single precision says nothing.
-const SURE: f64 = 1e-6;
 
 /// The masks without what is fainter than the rest or what the other view speaks against, and how many
 /// pixels of each mask that left out. `maps` are the probabilities that the masks were made of.
@@ -40,7 +33,7 @@ const SURE: f64 = 1e-6;
 /// [`Error::Segmentation`] for a mask without a pixel.
 ///
 /// # Cost
-/// Two thinnings of both masks, and O(strands² · planes).
+/// Three thinnings of both masks, and O(strands² · planes).
 pub(crate) fn without_strays(
     masks: &[Array2<bool>; 2],
     maps: &[Array2<f32>; 2],
@@ -56,7 +49,15 @@ pub(crate) fn without_strays(
     let at2 = |x: f64, y: f64| {
         angles.view2(Pixel::<View2>::new(x, y)).ok().map(|a| (a.phi, a.gradient_per_px))
     };
-    let mut kept = masks.clone();
+    let without_faint = |view: usize, number: u8| {
+        Mask::from_array(masks[view].clone())
+            .and_then(|mask| {
+                without_faint_pieces(&mask, &maps[view], PostProcessing::FAINTNESS_LOGITS)
+            })
+            .map(Mask::into_array)
+            .map_err(refuse(number))
+    };
+    let mut kept = [without_faint(0, View1::NUMBER)?, without_faint(1, View2::NUMBER)?];
     for parts_of in [Parts::pieces, Parts::strands] {
         let parts = |view: usize, number: u8| {
             Mask::from_array(kept[view].clone())
@@ -132,31 +133,30 @@ struct Parts {
 }
 
 impl Parts {
-    /// The pieces, without those that are far fainter than the surest.
-    fn pieces(mask: &Mask, map: &Array2<f32>) -> Result<Self, SegError> {
-        let skeleton = Skeleton::of(mask)?;
+    /// The pieces, all of them doubtful.
+    fn pieces(mask: &Mask, _: &Array2<f32>) -> Result<Self, SegError> {
         let components = Components::of(mask)?;
-        let labels = components.labels().clone();
-        let (lengths, logits) = surety(&skeleton, &labels, components.sizes().len(), map);
-        let longest = lengths.iter().copied().max().unwrap_or(0) as f64;
-        let surest = surest(&logits, &lengths, LONG_PIECE * longest);
-        let kept = logits.iter().map(|logit| *logit >= surest - FAINTER).collect();
-        let doubtful = vec![true; logits.len()];
-        Ok(Self { labels, skeleton, kept, doubtful, alone: 0.0 })
+        let count = components.sizes().len();
+        Ok(Self {
+            labels: components.labels().clone(),
+            skeleton: Skeleton::of(mask)?,
+            kept: vec![true; count],
+            doubtful: vec![true; count],
+            alone: 0.0,
+        })
     }
 
     /// The strands, all of them; the fainter ones are doubtful.
     fn strands(mask: &Mask, map: &Array2<f32>) -> Result<Self, SegError> {
         let strands = Strands::of(mask)?;
         let (labels, skeleton) = (strands.labels().clone(), strands.skeleton().clone());
-        let (lengths, logits) = surety(&skeleton, &labels, strands.count(), map);
-        let surest = surest(&logits, &lengths, STRAND_PX as f64);
-        let doubtful = logits
+        let of_strands = Surety::of_parts(&skeleton, &labels, strands.count(), map);
+        let least = Surety::surest(&of_strands, STRAND_PX as f64) - FAINTER_STRAND;
+        let doubtful = of_strands
             .iter()
-            .zip(&lengths)
-            .map(|(logit, length)| *length >= STRAND_PX && *logit < surest - FAINTER_STRAND)
+            .map(|strand| strand.length_px >= STRAND_PX && strand.logit < least)
             .collect();
-        let kept = vec![true; logits.len()];
+        let kept = vec![true; of_strands.len()];
         Ok(Self { labels, skeleton, kept, doubtful, alone: ALONE })
     }
 
@@ -183,30 +183,6 @@ impl Parts {
             *set &= *piece > 0 && held[*piece as usize - 1];
         });
     }
-}
-
-/// The greatest logit of the parts that are long enough.
-fn surest(logits: &[f64], lengths: &[usize], least_px: f64) -> f64 {
-    let long = logits.iter().zip(lengths).filter(|(_, length)| **length as f64 >= least_px);
-    long.map(|(logit, _)| *logit).fold(f64::NEG_INFINITY, f64::max)
-}
-
-/// Skeleton pixels of each part, and the median of their logits.
-fn surety(
-    skeleton: &Skeleton,
-    labels: &Array2<u32>,
-    count: usize,
-    map: &Array2<f32>,
-) -> (Vec<usize>, Vec<f64>) {
-    let mut logits = vec![Vec::new(); count];
-    for &pixel in skeleton.pixels() {
-        let Some(part) = (labels[pixel] as usize).checked_sub(1) else { continue };
-        let probability = map.get(pixel).map_or(0.0, |p| f64::from(*p));
-        let sure = probability.clamp(SURE, 1.0 - SURE);
-        logits[part].push((sure / (1.0 - sure)).ln());
-    }
-    let lengths = logits.iter().map(Vec::len).collect();
-    (lengths, logits.iter_mut().map(|of_part| median(of_part)).collect())
 }
 
 /// The parts of one mask as the epipolar planes see them: a step from pixel to pixel of a skeleton, as

@@ -18,7 +18,7 @@ pub(super) const DOUBTED_LACKING_PX: f64 = 3.0;
 /// The shortest end that is tried, and by how much each next one is longer: as a part, and px at least.
 const FIRST_PX: f64 = 5.0;
 const LONGER: f64 = 0.2;
-/// What must be left of the curve: of one that is wrong for the most part no end tells which part is right.
+/// What must be left of the curve, of both ends together: of one that is wrong for the most part no end tells which part is right.
 const LEAST_PART: f64 = 0.55;
 
 /// What tells whether the pictures show an end.
@@ -81,13 +81,14 @@ impl Pictures<'_> {
         let pair =
             IntensityPair::around(&[curve], self.images, self.rig, &params, self.calibration)?;
         let ends = pair.ends(curve)?;
+        let gone_px: f64 = cut_px.iter().sum();
         let mut worst: Option<(f64, CurveEnd, f64)> = None;
         for end in [CurveEnd::Begin, CurveEnd::End] {
             if cut_px[usize::from(end == CurveEnd::End)] > 0.0 {
                 continue;
             }
             let mut px = FIRST_PX;
-            while px < (1.0 - LEAST_PART) * ends.length_px() {
+            while px + gone_px < (1.0 - LEAST_PART) * (ends.length_px() + gone_px) {
                 let lacking: f64 = ends.beyond(end, px).iter().map(|p| self.lacking_px(p)).sum();
                 if worst.is_none_or(|(most, ..)| lacking > most) {
                     worst = Some((lacking, end, px));

@@ -186,7 +186,7 @@ pub struct Measuring<'a> {
     pub scores: ScoreKind,
     /// Whether the [outcomes](Measured::cases) hold both kinds of scores, where curves have both.
     pub both_scores: bool,
-    /// What `accurate` mode on masks and images may correct view 2 by, if anything.
+    /// What `accurate` mode may correct view 2 by, if anything.
     pub calibration: Option<CalibrationPriors>,
     /// What segments the images; without it the image rows have no figures.
     pub segmenter: Option<&'a dyn Segmenter>,
