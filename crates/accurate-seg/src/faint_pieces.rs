@@ -19,8 +19,9 @@ const END_PX: f64 = 12.0;
 /// more than `max_faintness_logits` below that of the surest long piece.
 ///
 /// A faint piece stays if it goes on where a surer one, or another that stays, ends: across a gap of at
-/// most 60 px into which both ends point, or of less than 20 px. So a body that fades on its way keeps its pieces, and what a
-/// network takes for the body elsewhere in the image, always less surely than the body, goes.
+/// most 60 px into which both ends point, or of less than 20 px. So a body that fades on its way keeps
+/// its pieces, and what a network takes for the body elsewhere in the image, mostly less surely than the
+/// body, goes.
 ///
 /// # Errors
 /// [`SegError::BadFaintness`], [`SegError::WrongShape`], [`SegError::NotFinite`],
