@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use super::eval::table_scores;
 use super::outputs::Outputs;
-use crate::args::ReconstructArgs;
+use crate::args::{EngineChoice, Mirror, ReconstructArgs};
 use crate::code::Code;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -116,6 +116,8 @@ fn refuse_what_takes_no_effect(args: &ReconstructArgs) -> Result<(), Failure> {
         (args.grey.polarity() == Polarity::BodyBright, "--photometric monochrome1"),
         (args.model.model.is_some(), "--model"),
         (args.model.onnxruntime.is_some(), "--onnxruntime"),
+        (args.model.engine != EngineChoice::Auto, "--engine"),
+        (args.model.mirror != Mirror::Opposite, "--mirror"),
     ];
     let refused = |message: String, hint: String| {
         Err(Failure::new(Failure::USAGE, message).with_hint(hint + ", or leave the option out"))

@@ -142,7 +142,12 @@ fn bright_bodies_give_the_curve_of_dark_ones() {
 #[test]
 fn options_of_images_are_refused_where_none_are_read() {
     let dir = TempDir::new().unwrap();
-    for option in [["--photometric", "monochrome1"], ["--model", "no.accmodel"]] {
+    for option in [
+        ["--photometric", "monochrome1"],
+        ["--model", "no.accmodel"],
+        ["--engine", "rten"],
+        ["--mirror", "all"],
+    ] {
         let out = dir.path().join("out");
         let mut command = accurate();
         command.args(["reconstruct", "-i", "mask"]).args(option).arg("-o").arg(&out);
