@@ -1,7 +1,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use accurate3d::io::write_atomically;
+use accurate3d::io::{require_writable, write_atomically};
 
 use crate::code::Code;
 use crate::failure::Failure;
@@ -37,18 +37,29 @@ pub fn check_output(path: &Path) -> Result<(), Failure> {
         let message = format!("cannot write {}: it is a folder", path.display());
         return Err(Failure::new(Failure::IO, message).with_hint("name a file"));
     }
+    // A device or a pipe takes what is written to it, whatever its folder does.
+    if path.exists() && !path.is_file() {
+        return Ok(());
+    }
     check_folder(path.parent().unwrap_or(path))
 }
 
 /// The same for a folder that outputs are to go to.
 pub fn check_folder(path: &Path) -> Result<(), Failure> {
-    match path.ancestors().find(|folder| folder.exists()) {
+    let above = path.ancestors().map(|folder| match folder.as_os_str().is_empty() {
+        true => Path::new("."),
+        false => folder,
+    });
+    match above.into_iter().find(|folder| folder.exists()) {
         Some(file) if !file.is_dir() => {
             let message = format!("cannot make folder {}", path.display());
             let message = format!("{message}: {} is a file", file.display());
             Err(Failure::new(Failure::IO, message))
         }
-        _ => Ok(()),
+        Some(folder) => {
+            require_writable(folder).map_err(|error| Failure::of_output(error).of_file(path))
+        }
+        None => Ok(()),
     }
 }
 

@@ -59,6 +59,15 @@ pub fn write_atomically(
     Ok(())
 }
 
+/// Refuses a folder in which no file can be made, before the work whose results are to go there.
+///
+/// # Errors
+/// [`IoError::System`] or [`IoError::Missing`] naming the folder.
+pub fn require_writable(folder: &Path) -> Result<(), IoError> {
+    let probe = Builder::new().prefix(".").suffix(SUFFIX).tempfile_in(folder);
+    probe.map(drop).map_err(|e| IoError::system(folder, "write to", e))
+}
+
 /// Removes what killed runs left unfinished in `folder` and returns how many files that were.
 ///
 /// Call it before a run that has the folder for itself: a file another process is writing at this
@@ -160,6 +169,17 @@ mod tests {
         write_atomically(&pipe, |w| w.write_all(b"through")).unwrap();
         assert_eq!(reader.join().unwrap(), b"through");
         assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo());
+    }
+
+    #[test]
+    fn a_folder_that_takes_no_file_is_refused_and_one_that_does_stays_empty() {
+        let folder = tempfile::tempdir().unwrap();
+        require_writable(folder.path()).unwrap();
+        assert!(names(folder.path()).is_empty());
+        assert!(require_writable(&folder.path().join("nowhere")).is_err());
+        // Where nobody may write, whoever runs this.
+        #[cfg(target_os = "linux")]
+        assert!(require_writable(Path::new("/sys")).is_err());
     }
 
     #[test]

@@ -57,7 +57,7 @@ mod rig_file;
 mod unit;
 mod vtp;
 
-pub use atomic::{remove_unfinished, write_atomically};
+pub use atomic::{remove_unfinished, require_writable, write_atomically};
 pub use bounded::read_file;
 pub use cameras::{
     CameraFormat, CameraSource, NamedView, ViewDefaults, is_dicom, read_cameras, write_cameras,

@@ -1,5 +1,7 @@
 use accurate3d::io::{CameraFormat, NamedView, write_cameras};
 
+use serde_json::json;
+
 use super::doctor;
 use crate::args::{CameraArgs, CameraCommand, CameraTarget, ConvertArgs};
 use crate::console::Console;
@@ -94,6 +96,10 @@ fn convert(args: &ConvertArgs, console: &Console) -> Result<(), Failure> {
         for note in &view.notes {
             console.remark(&format!("{}: {note}", view.name));
         }
+    }
+    if console.json {
+        let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+        return console.json(&json!({"file": args.out.display().to_string(), "views": names}));
     }
     console.remark(&format!("{} views in {}", views.len(), args.out.display()));
     Ok(())

@@ -142,7 +142,7 @@ fn both_alike() -> Failure {
 
 /// Pair folders that share their cameras, and their points, or their masks where there are none.
 fn of_pair_folders(folders: &[PathBuf]) -> Result<([NamedView; 2], Option<Seen>), Failure> {
-    let mut shared: Option<(PathBuf, Rig)> = None;
+    let mut shared: Option<(PathBuf, String, Rig)> = None;
     let mut curves = Vec::new();
     for folder in folders {
         for dir in find_pairs(folder)? {
@@ -155,14 +155,14 @@ fn of_pair_folders(folders: &[PathBuf]) -> Result<([NamedView; 2], Option<Seen>)
             };
             let pair = read_pair(&dir, parts)?;
             match &shared {
-                Some((other, rig)) if *rig != pair.rig => {
+                Some((other, _, rig)) if *rig != pair.rig => {
                     let message =
                         format!("{} and {} have other cameras", other.display(), dir.display());
                     return Err(Failure::new(Failure::USAGE, message)
                         .with_hint("examine pairs with different cameras one by one"));
                 }
                 Some(_) => {}
-                None => shared = Some((dir.clone(), pair.rig.clone())),
+                None => shared = Some((dir.clone(), pair.case_id.clone(), pair.rig.clone())),
             }
             if let Some((one, two)) = &pair.points {
                 let plain1 = one.iter().map(|p| p.point()).collect();
@@ -176,11 +176,11 @@ fn of_pair_folders(folders: &[PathBuf]) -> Result<([NamedView; 2], Option<Seen>)
             }
         }
     }
-    let Some((dir, rig)) = shared else {
+    let Some((_, id, rig)) = shared else {
         return Err(Failure::new(Failure::USAGE, "no pair folder is named"));
     };
     let view = |camera: &Camera, number: u8| NamedView {
-        name: format!("{}_{number}", dir.file_name().unwrap_or_default().to_string_lossy()),
+        name: format!("{id}_{number}"),
         camera: camera.clone(),
         unit: rig.unit(),
         frame: "as in the folder".into(),

@@ -7,7 +7,7 @@ use accurate3d::synth::{
     CalibrationError, CaseOptions, Family, SynthCase, XrayOptions, generate, render_xray,
 };
 use rayon::prelude::*;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::xray;
 use crate::args::{CasesArgs, Disturbances, PointsKind, SynthArgs, SynthCommand};
@@ -55,6 +55,15 @@ fn generate_cases(
         Ok::<(), Failure>(())
     })?;
     bar.finish_and_clear();
+    if console.json {
+        return console.json(&json!({
+            "folder": out.display().to_string(),
+            "family": family.to_string(),
+            "seed": args.seed,
+            "first": args.first,
+            "cases": args.count,
+        }));
+    }
     console.remark(&format!("{} cases of {} in {}", args.count, family, out.display()));
     Ok(())
 }

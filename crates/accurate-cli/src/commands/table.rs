@@ -68,7 +68,11 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
     let bar = console.progress(set.len(), "measuring");
     let table = measure(&set, &rows, &how, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    let format = if console.json { Some(accurate3d::table::Format::Json) } else { args.format };
+    // A file has the format that is asked for; what is printed is JSON then.
+    let format = match console.json && (args.out.is_none() || args.format.is_none()) {
+        true => Some(accurate3d::table::Format::Json),
+        false => args.format,
+    };
     let text = match format {
         Some(format) => render(&table, format),
         None => {
@@ -82,6 +86,9 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
     match &args.out {
         Some(path) => write_text(path, &text)?,
         None => console.data(text.trim_end())?,
+    }
+    if console.json && args.out.is_some() {
+        console.data(render(&table, accurate3d::table::Format::Json).trim_end())?;
     }
     if let Some(path) = &args.per_case {
         let lines = cases_csv(&table).map_err(|problem| {

@@ -1,5 +1,5 @@
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use accurate3d::io::{
     hash_file, read_grey, remove_unfinished, write_json, write_npy_u8, write_rgb,
@@ -12,6 +12,7 @@ use indicatif::ProgressBar;
 use ndarray::{Array2, Array4, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::args::{XrayArgs, XrayGenerator};
 use crate::console::Console;
@@ -68,9 +69,22 @@ pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
         let samples: Vec<_> =
             (args.first..last).into_par_iter().map(draw).collect::<Result<_, _>>()?;
         write_rgb(path, &sheet(&samples)).map_err(Failure::of_output)?;
-        console.remark(&format!("{} images in {}", args.count, path.display()));
+        if !console.json {
+            console.remark(&format!("{} images in {}", args.count, path.display()));
+        }
     }
-    Ok(())
+    if !console.json {
+        return Ok(());
+    }
+    let place = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
+    console.json(&json!({
+        "shards": place(&args.shards),
+        "sheet": place(&args.sheet),
+        "generator": generator_name(args)?,
+        "seed": args.seed,
+        "first": args.first,
+        "images": args.count,
+    }))
 }
 
 /// The square of `side` px in the middle of a grey image, as eight bits.

@@ -117,6 +117,36 @@ fn the_same_bytes_of_one_pair_in_doubt_for_any_number_of_threads() {
 }
 
 #[test]
+fn what_writes_files_says_so_as_json() {
+    let dir = TempDir::new().unwrap();
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    let (set, sheet, rig, table) = (at("set"), at("sheet.png"), at("rig.toml"), at("table.csv"));
+    let bend = samples().join("bend").display().to_string();
+    for (words, key, value) in [
+        (vec!["synth", "easy", "--count", "2", "-o", &set], "cases", Value::from(2)),
+        (vec!["synth", "xray", "--count", "1", "--sheet", &sheet], "images", Value::from(1)),
+        (
+            vec!["camera", "convert", &bend, "--to", "rig-toml", "-o", &rig],
+            "file",
+            rig.as_str().into(),
+        ),
+        (
+            vec![
+                "table", "--set", &set, "--input", "points", "--method", "paper", "--format",
+                "csv", "-o", &table,
+            ],
+            "cases",
+            Value::from(2),
+        ),
+    ] {
+        let said = stdout(accurate().arg("--json").args(&words));
+        let said: Value = serde_json::from_str(&said).unwrap();
+        assert_eq!(said[key], value, "{words:?}: {said}");
+    }
+    assert!(fs::read_to_string(table).unwrap().starts_with("set,cases,"));
+}
+
+#[test]
 fn the_camera_of_a_third_view_may_be_one_of_several_in_its_file() {
     let bend = samples().join("bend");
     let truth = bend.join("annotations/guidewire_3D.ply");
