@@ -121,6 +121,8 @@ fn length([row, column]: [f64; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     /// Horizontal bars of 3 px: row of the axis, first and last column, probability.
@@ -139,6 +141,42 @@ mod tests {
         let (mask, map) = drawn(bars);
         let left = without_faint_pieces(&mask, &map, max_faintness_logits).unwrap();
         bars.iter().map(|(row, first, last, _)| left.get(*row, (first + last) / 2)).collect()
+    }
+
+    /// By the rule as it is told: pieces are added as long as one goes on from one that is kept.
+    fn by_rounds(mask: &Mask, map: &Array2<f32>, max_faintness_logits: f64) -> Mask {
+        let (components, skeleton) = (Components::of(mask).unwrap(), Skeleton::of(mask).unwrap());
+        let (labels, count) = (components.labels(), components.sizes().len());
+        let pieces = Surety::of_parts(&skeleton, labels, count, map);
+        let longest = pieces.iter().map(|piece| piece.length_px).max().unwrap();
+        let least = Surety::surest(&pieces, LONG_PIECE * longest as f64) - max_faintness_logits;
+        let mut keep: Vec<bool> = pieces.iter().map(|piece| piece.logit >= least).collect();
+        let ends = PieceEnd::all(&skeleton, labels);
+        while let Some(next) = (0..count).find(|&k| {
+            let goes_on = |end: &PieceEnd| ends.iter().any(|to| keep[to.piece] && end.leads_to(to));
+            !keep[k] && ends.iter().filter(|end| end.piece == k).any(goes_on)
+        }) {
+            keep[next] = true;
+        }
+        Mask::from_array(labels.mapv(|label| label > 0 && keep[label as usize - 1])).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn it_is_the_rule_and_who_allows_more_keeps_more(
+            bars in prop::collection::vec((2_usize..118, 0_usize..200, 4_usize..60, 0.35_f32..0.9999), 1..9),
+            allowed in 0.0_f32..6.0,
+            more in 0.0_f32..3.0,
+        ) {
+            let bars: Vec<_> = bars.into_iter().map(|(row, x, n, p)| (row, x, x + n, p)).collect();
+            let (mask, map) = drawn(&bars);
+            let [few, many] = [allowed, allowed + more]
+                .map(|logits| without_faint_pieces(&mask, &map, logits).unwrap());
+            prop_assert_eq!(&few, &by_rounds(&mask, &map, f64::from(allowed)));
+            prop_assert!(!few.is_empty());
+            prop_assert!(few.foreground().all(|(row, column)| many.get(row, column)));
+            prop_assert!(many.foreground().all(|(row, column)| mask.get(row, column)));
+        }
     }
 
     const WIRE: (usize, usize, usize, f32) = (20, 10, 100, 0.999);
