@@ -161,6 +161,10 @@ fn the_camera_of_a_third_view_may_be_one_of_several_in_its_file() {
     let scores = |view: &str| -> Value {
         serde_json::from_str(&stdout(&mut eval(&["--view", view]))).unwrap()
     };
+    let mut without = accurate();
+    without.arg("eval").arg(&truth).arg("--truth").arg(&truth).args(["--unit", "mm"]);
+    let (code, message) = failure(&mut without);
+    assert!(code == 2 && message.contains("--unit is for the file of --third"), "{message}");
     let mean = |scores: Value| scores["third_view"]["mean_px"].as_f64().unwrap();
     // The truth lies in the middle of its own image and beside the other one.
     let (own, other) = (mean(scores("easy-2026-001_2")), mean(scores("easy-2026-001_1")));
