@@ -104,6 +104,18 @@ pub fn make_place(path: &Path) -> Result<(), Failure> {
     }
 }
 
+/// [`make_place`] for a file apart from all that is `read`.
+///
+/// # Errors
+/// Also [`refuse_what_is_read`]'s.
+pub fn make_place_apart<'p>(
+    path: &Path,
+    read: impl IntoIterator<Item = &'p PathBuf>,
+) -> Result<(), Failure> {
+    refuse_what_is_read(path, &places(read))?;
+    make_place(path)
+}
+
 /// Removes a file where there is one.
 pub fn remove_file(path: &Path) -> Result<(), Failure> {
     match std::fs::remove_file(path) {

@@ -13,6 +13,9 @@ use crate::dicom_child;
 use crate::failure::Failure;
 use crate::units::common_unit;
 
+/// The hint where both views show the same.
+pub const NEVER_THE_SAME: &str = "two cameras never see the same: is one file named twice?";
+
 /// The cameras of files of any kind; DICOM is read by a process of its own.
 pub fn cameras_of(files: &[PathBuf], defaults: &ViewDefaults) -> Result<Vec<NamedView>, Failure> {
     let mut views = Vec::new();

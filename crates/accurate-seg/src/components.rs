@@ -52,6 +52,13 @@ impl Components {
     pub fn sizes(&self) -> &[usize] {
         &self.sizes
     }
+
+    /// The mask that was labelled without the components of which `keep`, which is given their numbers,
+    /// says so.
+    pub(crate) fn select(&self, mask: &Mask, keep: impl Fn(u32) -> bool) -> Mask {
+        let labels = self.labels.as_slice().unwrap_or_default();
+        mask.clone().retain(|index| keep(labels[index]))
+    }
 }
 
 /// Only the largest 8-connected component; of equal ones the first in raster order.
@@ -63,7 +70,7 @@ pub fn keep_largest(mask: &Mask) -> Result<Mask, SegError> {
     let components = Components::of(mask)?;
     let largest = components.sizes.iter().copied().max().unwrap_or(0);
     let number = components.sizes.iter().position(|&size| size == largest).unwrap_or(0) + 1;
-    Ok(select(mask, &components, |label| label as usize == number))
+    Ok(components.select(mask, |label| label as usize == number))
 }
 
 /// Without the 8-connected components of fewer than `min_area_px` pixels. The result may be empty.
@@ -73,12 +80,7 @@ pub fn keep_largest(mask: &Mask) -> Result<Mask, SegError> {
 pub fn remove_smaller_than(mask: &Mask, min_area_px: usize) -> Result<Mask, SegError> {
     let components = Components::of(mask)?;
     let large = |label: u32| components.sizes[label as usize - 1] >= min_area_px;
-    Ok(select(mask, &components, large))
-}
-
-fn select(mask: &Mask, components: &Components, keep: impl Fn(u32) -> bool) -> Mask {
-    let labels = components.labels.as_slice().unwrap_or_default();
-    mask.clone().retain(|index| keep(labels[index]))
+    Ok(components.select(mask, large))
 }
 
 /// Bytes in raster order as an image of imageproc, which counts pixels in u32.

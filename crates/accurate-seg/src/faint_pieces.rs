@@ -59,8 +59,7 @@ pub fn without_faint_pieces(
         }
         open.extend(faint.extract_if(.., |end| keep[end.piece]));
     }
-    let labels: Vec<u32> = labels.iter().copied().collect();
-    Ok(mask.clone().retain(|index| labels[index] > 0 && keep[labels[index] as usize - 1]))
+    Ok(components.select(mask, |label| keep[label as usize - 1]))
 }
 
 /// Refuses a difference of logits that is negative or no number.

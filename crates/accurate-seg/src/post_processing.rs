@@ -120,8 +120,7 @@ fn without_short_pieces(mask: Mask, min_length_px: usize) -> Result<Mask, SegErr
         .enumerate()
         .map(|(k, &length)| length >= min_length_px || Some(k) == first)
         .collect();
-    let labels: Vec<u32> = labels.iter().copied().collect();
-    Ok(mask.retain(|index| labels[index] > 0 && keep[labels[index] as usize - 1]))
+    Ok(components.select(&mask, |label| keep[label as usize - 1]))
 }
 
 #[cfg(test)]

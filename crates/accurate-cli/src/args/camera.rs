@@ -40,6 +40,12 @@ impl StatedArgs {
     pub fn defaults(&self) -> ViewDefaults {
         ViewDefaults { image_size: self.image_size, unit: self.unit }
     }
+
+    /// The first of these options that is given.
+    pub fn given(&self) -> Option<&'static str> {
+        let size = self.image_size.map(|_| "--image-size");
+        size.or(self.unit.map(|_| "--unit"))
+    }
 }
 
 #[derive(Debug, Args)]

@@ -1,5 +1,4 @@
 use accurate3d::io::{CameraFormat, NamedView, write_cameras};
-
 use serde_json::json;
 
 use super::doctor;

@@ -15,8 +15,8 @@ use super::trace::cheapest_walk;
 use crate::args::DoctorArgs;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::{has_extension, make_place, places, refuse_what_is_read};
-use crate::two_views::two_cameras;
+use crate::text::{has_extension, make_place_apart};
+use crate::two_views::{NEVER_THE_SAME, two_cameras};
 
 /// `accurate camera doctor`: what is wrong with two cameras, by what was seen with them.
 pub fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
@@ -26,8 +26,7 @@ pub fn run(args: &DoctorArgs, console: &Console) -> Result<(), Failure> {
             return Err(Failure::new(Failure::USAGE, message));
         }
         let seen = [&args.matched, &args.points, &args.masks].into_iter().flatten();
-        refuse_what_is_read(path, &places(args.files.iter().chain(seen)))?;
-        make_place(path)?;
+        make_place_apart(path, args.files.iter().chain(seen))?;
     }
     let (views, seen) = examined(args)?;
     let unit = common_unit(&views)?;
@@ -71,12 +70,8 @@ fn examined(args: &DoctorArgs) -> Result<([NamedView; 2], Option<Seen>), Failure
     let named = !kinds.iter().all(|files| files.is_empty());
     let folders = args.files.iter().all(|f| f.is_dir() && !f.join("cameras.txt").is_file());
     if folders {
-        let stated = [
-            ("--views", !args.views.is_empty()),
-            ("--image-size", args.stated.image_size.is_some()),
-            ("--unit", args.stated.unit.is_some()),
-        ];
-        if let Some((option, _)) = stated.into_iter().find(|(_, given)| *given) {
+        let views = (!args.views.is_empty()).then_some("--views");
+        if let Some(option) = views.or(args.stated.given()) {
             return Err(usage(&format!(
                 "{option} is for camera files; a pair folder says it itself"
             ))
@@ -137,7 +132,7 @@ fn of_files(args: &DoctorArgs, views: &[NamedView; 2]) -> Result<Option<Seen>, F
 
 fn both_alike() -> Failure {
     Failure::new(Failure::USAGE, "what was seen is the same in both views")
-        .with_hint("two cameras never see the same: is one file named twice?")
+        .with_hint(NEVER_THE_SAME)
 }
 
 /// Pair folders that share their cameras, and their points, or their masks where there are none.

@@ -19,12 +19,7 @@ pub fn run(args: &EvalArgs, console: &Console) -> Result<(), Failure> {
         let message = format!("--spacing is {spacing}; expected a positive length");
         return Err(Failure::new(Failure::USAGE, message));
     }
-    let stated = [
-        ("--image-size", args.stated.image_size.is_some()),
-        ("--unit", args.stated.unit.is_some()),
-    ];
-    if let Some((option, _)) = stated.into_iter().find(|(_, given)| *given && args.third.is_none())
-    {
+    if let (Some(option), None) = (args.stated.given(), &args.third) {
         return Err(Failure::new(Failure::USAGE, format!("{option} is for the file of --third"))
             .with_hint("curves and pair folders say it themselves: leave it out"));
     }

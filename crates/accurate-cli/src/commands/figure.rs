@@ -7,7 +7,7 @@ use crate::args::FigureArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::raster::{is_picture, write_picture};
-use crate::text::{make_place, places, refuse_what_is_read};
+use crate::text::make_place_apart;
 
 /// Cases of the comparing figures, one a column.
 const COLUMNS: u64 = 3;
@@ -20,8 +20,7 @@ pub fn run(args: &FigureArgs, console: &Console) -> Result<(), Failure> {
         let message = format!("figures are written as .svg or .png, not as {}", args.out.display());
         return Err(Failure::new(Failure::USAGE, message));
     }
-    refuse_what_is_read(&args.out, &places(&args.pairs))?;
-    make_place(&args.out)?;
+    make_place_apart(&args.out, &args.pairs)?;
     let cases = if args.pairs.is_empty() { generated(args.kind)? } else { given(args)? };
     write_picture(&args.out, &figure_svg(args.kind, &cases)?, PNG_SCALE)?;
     let ids: Vec<&str> = cases.iter().map(|case| case.id.as_str()).collect();

@@ -12,7 +12,7 @@ use crate::args::{ImportArgs, ModelCommand};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::segmentation::{bundle, library};
-use crate::text::{make_place, places, refuse_what_is_read};
+use crate::text::make_place_apart;
 
 /// Largest plans.json, dataset.json or description, bytes.
 const MAX_JSON_BYTES: u64 = 1 << 24;
@@ -29,8 +29,7 @@ pub fn run(command: &ModelCommand, console: &Console) -> Result<(), Failure> {
         }
         ModelCommand::Import(args) => import(args, console),
         ModelCommand::Pack { network, manifest, out } => {
-            refuse_what_is_read(out, &places([network, manifest]))?;
-            make_place(out)?;
+            make_place_apart(out, [network, manifest])?;
             let manifest = Manifest::from_json(&read_file(manifest, MAX_JSON_BYTES)?)
                 .map_err(|error| Failure::from(error).of_file(manifest))?;
             let bytes = read_file(network, MAX_NETWORK_BYTES)?;
@@ -151,8 +150,7 @@ fn import(args: &ImportArgs, console: &Console) -> Result<(), Failure> {
         None => only_network(&args.folder)?,
     };
     let read = [&network, &args.folder.join("plans.json"), &args.folder.join("dataset.json")];
-    refuse_what_is_read(&args.out, &places(read))?;
-    make_place(&args.out)?;
+    make_place_apart(&args.out, read)?;
     let name = match &args.name {
         Some(name) => name.clone(),
         None => args.out.file_stem().unwrap_or_default().to_string_lossy().into_owned(),

@@ -10,7 +10,7 @@ use crate::args::PlanArgs;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::raster::{is_picture, write_picture};
-use crate::text::{make_place, places, refuse_what_is_read, write_text};
+use crate::text::{has_extension, make_place_apart, write_text};
 use crate::two_views::one_view;
 use crate::units::common_unit;
 
@@ -27,8 +27,7 @@ pub fn run(args: &PlanArgs, console: &Console) -> Result<(), Failure> {
                 format!("a plan is written as .svg, .png or .csv, not {}", path.display());
             return Err(Failure::new(Failure::USAGE, message));
         }
-        refuse_what_is_read(path, &places([&args.shape, &args.first]))?;
-        make_place(path)?;
+        make_place_apart(path, [&args.shape, &args.first])?;
     }
     let view = one_view(&args.first, args.view.as_deref(), &args.stated.defaults())?;
     let shape = read_curve(&args.shape)?;
@@ -72,7 +71,7 @@ pub fn run(args: &PlanArgs, console: &Console) -> Result<(), Failure> {
 }
 
 fn is_csv(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"))
+    has_extension(path, "csv")
 }
 
 fn line(view: &PlannedView, unit: LengthUnit) -> String {

@@ -20,7 +20,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::segmentation::segmenter;
 use crate::text::places;
-use crate::two_views::{are_files, files_behind, pair_of_files};
+use crate::two_views::{NEVER_THE_SAME, are_files, files_behind, pair_of_files};
 
 /// What one run reads.
 enum Source {
@@ -156,18 +156,16 @@ fn jobs(args: &ReconstructArgs, config: &str) -> Result<Vec<(Source, Outputs)>, 
     if are_files(args) {
         return Ok(vec![(Source::Files, outputs)]);
     }
-    for (given, option) in [
-        (args.truth.is_some(), "--truth"),
-        (!args.frame.is_empty(), "--frame"),
-        (!args.views.views.is_empty(), "--views"),
-        (args.views.stated.image_size.is_some(), "--image-size"),
-        (args.views.stated.unit.is_some(), "--unit"),
-    ] {
-        if given {
-            let message = format!("{option} is for two views given as files");
-            return Err(Failure::new(Failure::USAGE, message)
-                .with_hint("a pair folder says this itself: docs/conventions.md"));
-        }
+    let of_files = [
+        args.truth.is_some().then_some("--truth"),
+        (!args.frame.is_empty()).then_some("--frame"),
+        (!args.views.views.is_empty()).then_some("--views"),
+        args.views.stated.given(),
+    ];
+    if let Some(option) = of_files.into_iter().flatten().next() {
+        let message = format!("{option} is for two views given as files");
+        return Err(Failure::new(Failure::USAGE, message)
+            .with_hint("a pair folder says this itself: docs/conventions.md"));
     }
     let mut pairs = Vec::new();
     for path in &args.inputs {
@@ -244,8 +242,7 @@ fn check_views(pair: &ViewPair) -> Result<(), Failure> {
     for (same, what) in [(points, "points"), (masks, "masks"), (images, "images")] {
         if same {
             let message = format!("{}: the {what} of both views are the same", pair.id);
-            return Err(Failure::new(Failure::BAD_INPUT, message)
-                .with_hint("two cameras never see the same: is one file named twice?"));
+            return Err(Failure::new(Failure::BAD_INPUT, message).with_hint(NEVER_THE_SAME));
         }
     }
     Ok(())

@@ -18,7 +18,7 @@ use crate::code::Code;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::segmentation::segmenter;
-use crate::text::{make_place, places, read_text, refuse_what_is_read, write_text};
+use crate::text::{make_place_apart, read_text, write_text};
 
 /// `accurate table`: the paper's table on a set, or the check of its cells.
 pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
@@ -49,8 +49,7 @@ pub fn run(args: &TableArgs, console: &Console) -> Result<(), Failure> {
             .with_hint("name another file with --per-case"));
     }
     for path in args.out.iter().chain(&args.per_case) {
-        refuse_what_is_read(path, &places([&PathBuf::from(&args.set)]))?;
-        make_place(path)?;
+        make_place_apart(path, [&PathBuf::from(&args.set)])?;
     }
     let calibration = args.refine_calibration.then_some(CalibrationPriors::DEFAULT);
     let segmenter = match rows.iter().any(|row| row.input == InputKind::Image)

@@ -11,13 +11,12 @@ use serde_json::{Value, json};
 use crate::args::{TraceArgs, TraceMethod};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::{make_place, places, refuse_what_is_read, write_text};
+use crate::text::{make_place_apart, write_text};
 
 /// `accurate trace`: a mask's skeleton in order, as `x,y` lines.
 pub fn run(args: &TraceArgs, console: &Console) -> Result<(), Failure> {
     if let Some(path) = &args.out {
-        make_place(path)?;
-        refuse_what_is_read(path, &places([&args.mask]))?;
+        make_place_apart(path, [&args.mask])?;
     }
     let traced = ordered(&read_mask(&args.mask)?, args.method)
         .map_err(|failure| failure.of_file(&args.mask))?;

@@ -17,7 +17,7 @@ use serde_json::json;
 use crate::args::{XrayArgs, XrayGenerator};
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::text::{has_extension, make_place, places, refuse_what_is_read};
+use crate::text::{has_extension, make_place_apart};
 
 /// Name of the list of a folder of shards.
 const LIST: &str = "shards.json";
@@ -48,8 +48,7 @@ pub fn run(args: &XrayArgs, console: &Console) -> Result<(), Failure> {
                 format!("--count {}: a sheet holds at most {MOST_ON_A_SHEET} images", args.count);
             return Err(Failure::new(Failure::USAGE, message));
         }
-        refuse_what_is_read(path, &places(&args.onto))?;
-        make_place(path)?;
+        make_place_apart(path, &args.onto)?;
     }
     let backgrounds: Vec<_> =
         args.onto.iter().map(|path| middle_of(path, args.size)).collect::<Result<_, _>>()?;

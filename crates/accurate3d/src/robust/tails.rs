@@ -18,7 +18,8 @@ pub(super) const DOUBTED_LACKING_PX: f64 = 3.0;
 /// The shortest end that is tried, and by how much each next one is longer: as a part, and px at least.
 const FIRST_PX: f64 = 5.0;
 const LONGER: f64 = 0.2;
-/// What must be left of the curve, of both ends together: of one that is wrong for the most part no end tells which part is right.
+/// What must be left of the curve, of both ends together: of one that is wrong for the most part no end
+/// tells which part is right.
 const LEAST_PART: f64 = 0.55;
 
 /// What tells whether the pictures show an end.
