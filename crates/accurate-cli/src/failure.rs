@@ -57,8 +57,12 @@ impl Failure {
         self.of(&path.display().to_string())
     }
 
-    /// The same with what it is about in front.
+    /// The same with what it is about in front, unless it begins or ends with that as it is.
     pub fn of(self, name: &str) -> Self {
+        let ends = self.message.strip_suffix(name).is_some_and(|rest| rest.ends_with(' '));
+        if ends || self.message.starts_with(&format!("{name}: ")) {
+            return self;
+        }
         let message = format!("{name}: {}", self.message);
         self.about(message)
     }

@@ -81,6 +81,8 @@ fn engine(
         EngineChoice::Auto => EngineChoice::Rten,
         chosen => chosen,
     };
+    // Who names a library wants that one; the environment's may be meant for others.
+    let is_asked_for = args.engine == EngineChoice::Ort || args.onnxruntime.is_some();
     if chosen == EngineChoice::Ort {
         let Some(library) = named else {
             return Err(Failure::new(
@@ -93,7 +95,7 @@ fn engine(
         };
         match onnx_runtime(&library, bundle, threads) {
             Ok(engine) => return Ok(Box::new(engine)),
-            Err(error) if args.engine == EngineChoice::Ort => {
+            Err(error) if is_asked_for => {
                 return Err(Failure::new(Failure::UNAVAILABLE, error.to_string())
                     .with_hint("version 1.24 or later is needed; or take --engine rten"));
             }

@@ -140,6 +140,28 @@ fn pictures_tell_a_curve_that_runs_back_over_itself_from_the_body() {
 }
 
 #[test]
+fn a_fit_that_can_win_is_the_same_and_one_that_cannot_ends_early() {
+    for index in 0..4 {
+        let case = generate(Family::Medium, SEED, index, &CaseOptions::default()).unwrap();
+        let images = pictures(&case, XrayResponse::Linear);
+        let start = start(&case, 3.0);
+        let params = IntensityFitParams::DEFAULT;
+        let pair = IntensityPair::around(&[&start], &images, &case.rig, &params, None).unwrap();
+        let whole = pair.fit(&start).unwrap();
+        let first = pair.fit_to_beat(&start, f64::NEG_INFINITY).unwrap();
+        assert!(first.steps == 1 && !first.converged, "{first:?}");
+        assert!(first.cost > whole.cost && whole.steps > 3, "{} {}", first.cost, whole.cost);
+        // It wins, if not by much.
+        let wins = pair.fit_to_beat(&start, whole.cost + 0.1).unwrap();
+        assert_eq!((wins.curve, wins.cost, wins.steps), (whole.curve, whole.cost, whole.steps));
+        // One that is twice too dear is known before the last step to be so, and is dearer still.
+        let loses = pair.fit_to_beat(&start, 0.5 * whole.cost).unwrap();
+        assert!(loses.steps < whole.steps && !loses.converged, "{} {}", loses.steps, whole.steps);
+        assert!(loses.cost >= whole.cost, "{} {}", loses.cost, whole.cost);
+    }
+}
+
+#[test]
 fn what_shows_no_body_is_refused() {
     let case = generate(Family::Easy, SEED, 3, &CaseOptions::default()).unwrap();
     let curve = curve_through(&case.truth);

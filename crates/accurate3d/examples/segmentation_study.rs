@@ -3,7 +3,7 @@
 //! `cargo run --release -p accurate3d --features rten --example segmentation_study -- WHAT MODEL SEED COUNT [GENERATOR | IMAGE...]`
 //!
 //! WHAT is `score` (recall and precision at 2 px, clDice, mean distance of the skeletons' pixels both
-//! ways, with the model's own post-processing) or
+//! ways, with the model's own post-processing, means with 95 % intervals) or
 //! `tune` (the same over a grid of thresholds, smallest pieces and spurs; the best are printed last;
 //! seed 1500 is for this). GENERATOR is `training` (the default), `held-out`, `phantom`, or a family of
 //! cases (`medium`, `carm`, ...), of whose pictures both views are taken. With images, wires are drawn
@@ -15,7 +15,9 @@ use std::error::Error;
 use std::path::Path;
 use std::str::FromStr;
 
-use accurate3d::eval::{centreline_distance, cl_dice, skeleton_agreement};
+use accurate3d::eval::{
+    bootstrap_mean, centreline_distance, cl_dice, quantile_interval, skeleton_agreement,
+};
 use accurate3d::geom::Point2;
 use accurate3d::io::{read_file, read_grey};
 use accurate3d::seg::network::{
@@ -55,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     println!("{} of {count} images show a wire; {}", seen.len(), segmenter.describe());
     match what.as_str() {
-        "score" => println!("{}", Scores::of(&seen, own)?),
+        "score" => Scores::of(&seen, own)?.print()?,
         "tune" => tune(&seen)?,
         _ => return Err(format!("`{what}` is neither score nor tune").into()),
     }
@@ -126,17 +128,16 @@ fn square_of(path: &Path) -> Result<Array2<u8>, Box<dyn Error>> {
     }))
 }
 
-/// Means over images; one in which nothing was found counts as 0 in recall and clDice, and not in
-/// precision and distance.
-struct Scores {
-    recall: f64,
-    precision: f64,
-    cl_dice: f64,
-    centreline_px: f64,
-    nothing_found: usize,
-}
+/// Recall, precision, clDice and mean distance of the centrelines, px, of each image; none of one in which
+/// nothing was found: it counts as 0 in recall and clDice, and not in precision and distance.
+struct Scores(Vec<Option<[f64; 4]>>);
 
 impl Scores {
+    const RECALL: usize = 0;
+    const PRECISION: usize = 1;
+    const CL_DICE: usize = 2;
+    const CENTRELINE_PX: usize = 3;
+
     fn of(
         seen: &[(Array2<f32>, Array2<bool>)],
         post: PostProcessing,
@@ -161,21 +162,45 @@ impl Scores {
                 Ok(Some([agreement.recall, agreement.precision, dice, distance.mean]))
             })
             .collect::<Result<Vec<_>, String>>()?;
-        let found: Vec<[f64; 4]> = each.iter().flatten().copied().collect();
-        let sum = |k: usize| found.iter().map(|v| v[k]).sum::<f64>();
-        let (all, some) = (each.len().max(1) as f64, found.len().max(1) as f64);
-        Ok(Self {
-            recall: sum(0) / all,
-            precision: sum(1) / some,
-            cl_dice: sum(2) / all,
-            centreline_px: sum(3) / some,
-            nothing_found: each.len() - found.len(),
-        })
+        Ok(Self(each))
+    }
+
+    /// Of each image that counts.
+    fn of_each(&self, score: usize) -> Vec<f64> {
+        let without = matches!(score, Self::RECALL | Self::CL_DICE).then_some(0.0);
+        self.0.iter().filter_map(|found| found.map(|found| found[score]).or(without)).collect()
+    }
+
+    fn mean(&self, score: usize) -> f64 {
+        let values = self.of_each(score);
+        values.iter().sum::<f64>() / values.len().max(1) as f64
+    }
+
+    fn nothing_found(&self) -> usize {
+        self.0.iter().filter(|found| found.is_none()).count()
     }
 
     /// The harmonic mean of recall and precision.
     fn f_score(&self) -> f64 {
-        2.0 * self.recall * self.precision / (self.recall + self.precision).max(f64::MIN_POSITIVE)
+        let (recall, precision) = (self.mean(Self::RECALL), self.mean(Self::PRECISION));
+        2.0 * recall * precision / (recall + precision).max(f64::MIN_POSITIVE)
+    }
+
+    /// Means with 95 % intervals over the images, and the median distance.
+    fn print(&self) -> Result<(), Box<dyn Error>> {
+        for (name, score) in [
+            ("recall at 2 px", Self::RECALL),
+            ("precision at 2 px", Self::PRECISION),
+            ("clDice", Self::CL_DICE),
+            ("centreline, px", Self::CENTRELINE_PX),
+        ] {
+            let of = bootstrap_mean(&self.of_each(score), 10_000, name)?;
+            println!("{name}: {:.4} [{:.4}, {:.4}]", of.mean, of.low, of.high);
+        }
+        let of = quantile_interval(&self.of_each(Self::CENTRELINE_PX), 0.5)?;
+        println!("centreline, median image, px: {:.4} [{:.4}, {:.4}]", of.value, of.low, of.high);
+        println!("nothing found in {}", self.nothing_found());
+        Ok(())
     }
 }
 
@@ -184,12 +209,12 @@ impl std::fmt::Display for Scores {
         write!(
             f,
             "recall {:.4} precision {:.4} F {:.4} clDice {:.4} centreline {:.2} px, nothing found in {}",
-            self.recall,
-            self.precision,
+            self.mean(Self::RECALL),
+            self.mean(Self::PRECISION),
             self.f_score(),
-            self.cl_dice,
-            self.centreline_px,
-            self.nothing_found
+            self.mean(Self::CL_DICE),
+            self.mean(Self::CENTRELINE_PX),
+            self.nothing_found()
         )
     }
 }

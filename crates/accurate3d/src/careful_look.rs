@@ -1,8 +1,10 @@
 use accurate_eval::curve_scores;
 use accurate_fit::FitError;
+use accurate_geom::Point3;
 use accurate_seg::{SegError, Segmenter, Watch};
 use serde::Serialize;
 
+use crate::joint_search::JointSearch;
 use crate::robust::{SAME_PX, Suspicion, calls_for_a_careful_look, px_per_unit};
 use crate::segment::segment_images_again;
 use crate::{Error, InputKind, Method, Params, Reconstruction, ViewPair, reconstruct};
@@ -35,9 +37,13 @@ pub fn reconstruct_images(
     segmenter: &dyn Segmenter,
     watch: &Watch<'_>,
 ) -> Result<(Reconstruction, Option<ViewPair>), Error> {
-    let first = reconstruct(pair, params);
-    if !is_worth_a_look(&first, params) {
-        return first.map(|curve| (curve, None));
+    if params.method != Method::Accurate || params.input != InputKind::Image {
+        return reconstruct(pair, params).map(|curve| (curve, None));
+    }
+    let first = JointSearch::of(pair, params);
+    let as_it_is = |first: Result<JointSearch<'_>, Error>| Ok((first?.finished()?, None));
+    if !is_worth_a_look(&first) {
+        return as_it_is(first);
     }
     let again = match segment_images_again(pair, segmenter, watch) {
         Ok(Some(again)) => again,
@@ -48,33 +54,21 @@ pub fn reconstruct_images(
             return Err(error);
         }
         // No other way, or nothing found: the first look is all there is.
-        Ok(None) | Err(_) => return first.map(|curve| (curve, None)),
+        Ok(None) | Err(_) => return as_it_is(first),
     };
-    let (mut curve, taken, apart_px) = match (first, reconstruct(&again, params)) {
-        (Ok(first), Ok(second)) => {
-            let apart_px = apart_px(&first, &second, pair);
-            let taken = cost(&second) < cost(&first);
-            let mut curve = if taken { second } else { first };
-            doubt(&mut curve, apart_px);
-            (curve, taken, apart_px)
-        }
-        (Ok(first), Err(_)) => (first, false, None),
-        (Err(_), Ok(second)) => (second, true, None),
+    let (mut curve, look) = match (first, JointSearch::of(&again, params)) {
+        (Ok(first), Ok(second)) => the_better(first, second, pair)?,
+        (Ok(only), Err(_)) => (only.finished()?, CarefulLook { taken: false, apart_px: None }),
+        (Err(_), Ok(only)) => (only.finished()?, CarefulLook { taken: true, apart_px: None }),
         (Err(error), Err(_)) => return Err(error),
     };
-    curve.diagnostics.careful_look = Some(CarefulLook { taken, apart_px });
-    Ok((curve, taken.then_some(again)))
+    curve.diagnostics.careful_look = Some(look);
+    Ok((curve, look.taken.then_some(again)))
 }
 
-fn is_worth_a_look(first: &Result<Reconstruction, Error>, params: &Params) -> bool {
-    if params.method != Method::Accurate || params.input != InputKind::Image {
-        return false;
-    }
+fn is_worth_a_look(first: &Result<JointSearch<'_>, Error>) -> bool {
     match first {
-        Ok(curve) => curve
-            .diagnostics
-            .outline
-            .is_some_and(|outline| calls_for_a_careful_look(&outline.evidence)),
+        Ok(search) => calls_for_a_careful_look(&search.evidence()),
         // Another segmentation changes nothing of these.
         Err(
             Error::NotSegmented { .. }
@@ -86,15 +80,37 @@ fn is_worth_a_look(first: &Result<Reconstruction, Error>, params: &Params) -> bo
     }
 }
 
+/// Of two segmentations of a pair the curve that leaves less unexplained and bends less.
+fn the_better(
+    first: JointSearch<'_>,
+    second: JointSearch<'_>,
+    pair: &ViewPair,
+) -> Result<(Reconstruction, CarefulLook), Error> {
+    let apart_px = apart(&first.positions(), &second.positions(), pair);
+    if apart_px.is_some_and(|px| px <= SAME_PX) {
+        // Nor have the pictures two curves to choose between: they are asked about one.
+        let taken = second.evidence().cost() < first.evidence().cost();
+        let mut curve = if taken { second } else { first }.finished()?;
+        doubt(&mut curve, apart_px);
+        return Ok((curve, CarefulLook { taken, apart_px }));
+    }
+    let (first, second) = (first.finished()?, second.finished()?);
+    let apart_px = apart(&first.positions(), &second.positions(), pair);
+    let taken = cost(&second) < cost(&first);
+    let mut curve = if taken { second } else { first };
+    doubt(&mut curve, apart_px);
+    Ok((curve, CarefulLook { taken, apart_px }))
+}
+
 /// What speaks against a curve, of what can be compared between segmentations.
 fn cost(curve: &Reconstruction) -> f64 {
     curve.diagnostics.outline.map_or(f64::INFINITY, |outline| outline.evidence.cost())
 }
 
-fn apart_px(a: &Reconstruction, b: &Reconstruction, pair: &ViewPair) -> Option<f64> {
-    let (a, b) = (a.positions(), b.positions());
-    let per_unit = px_per_unit(&a, &pair.rig);
-    Some(curve_scores(&a, &b, 1.0 / per_unit).ok()?.hausdorff * per_unit)
+/// Hausdorff distance of two curves, px.
+fn apart(a: &[Point3], b: &[Point3], pair: &ViewPair) -> Option<f64> {
+    let per_unit = px_per_unit(a, &pair.rig);
+    Some(curve_scores(a, b, 1.0 / per_unit).ok()?.hausdorff * per_unit)
 }
 
 /// The order of the strands is ambiguous if two segmentations give different curves, and is not if they
@@ -194,6 +210,20 @@ mod tests {
         let (whole, seen) = looked(&pair, &segmenter).unwrap();
         assert!(seen.is_none() && whole.diagnostics.careful_look.is_none_or(|look| !look.taken));
         assert_eq!(whole.points, curve.points);
+    }
+
+    #[test]
+    fn of_two_segmentations_that_agree_the_curve_is_the_one_that_either_gives() {
+        let (_, pair) = case();
+        let (alone, _) = looked(&pair, &Off::new(FAR_ROWS, None)).unwrap();
+        let same = Off::new(FAR_ROWS, Some(Off::new(FAR_ROWS, None)));
+        let (curve, seen) = looked(&pair, &same).unwrap();
+        let look = curve.diagnostics.careful_look.unwrap();
+        // Nearest points of the same curve are found to rounding.
+        assert!(!look.taken && look.apart_px.unwrap() < 1e-9 && seen.is_none(), "{look:?}");
+        assert_eq!(curve.points, alone.points);
+        assert_eq!(curve.diagnostics.grey_levels, alone.diagnostics.grey_levels);
+        assert!(!curve.diagnostics.suspicions.contains(&Suspicion::Ambiguous));
     }
 
     #[test]

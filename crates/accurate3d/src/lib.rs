@@ -52,6 +52,7 @@ pub mod doctor;
 mod error;
 mod explanation;
 mod figure;
+mod joint_search;
 mod method;
 mod ordered_points;
 mod pair;

@@ -10,10 +10,10 @@ use ndarray::Array2;
 
 use crate::direction::runs_against;
 use crate::disorder::is_disordered;
+use crate::joint_search::JointSearch;
 use crate::ordered_points::adjusted_points;
 use crate::require::{require_one_size, require_segmented};
-use crate::robust::{reconstruct_masks, without_strays};
-use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled, sampled_ring};
+use crate::sampled_curve::along_epipolar_lines;
 use crate::{
     Diagnostics, Error, Explanation, InputKind, Method, Reconstruction, RobustParams, Suspicion,
     Traces, UnknownName, ViewPair,
@@ -97,7 +97,7 @@ const DRAWN_DOUBLED: f64 = 0.1;
 
 impl Params {
     /// What the joint choice goes by: on what a network found, not everything that masks allow.
-    fn in_effect(&self) -> RobustParams {
+    pub(crate) fn in_effect(&self) -> RobustParams {
         let drawn = self.input != InputKind::Image;
         RobustParams {
             exchange: self.robust.exchange && drawn,
@@ -162,17 +162,21 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
     Ok(found)
 }
 
-fn reconstruct_as_given(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
+/// What [`reconstruct`] asks of a pair before anything else.
+pub(crate) fn require_parts(pair: &ViewPair, params: &Params) -> Result<(), Error> {
     if params.input == InputKind::Image {
         require_segmented(pair)?;
     }
-    require_one_size(pair)?;
-    match (params.method, params.input) {
-        (Method::Accurate, InputKind::Mask | InputKind::Image) => {
-            return joint_choice(pair, params);
-        }
-        (Method::Accurate, InputKind::Points) => return adjusted_points(pair, params),
-        _ => {}
+    require_one_size(pair)
+}
+
+fn reconstruct_as_given(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
+    if params.method == Method::Accurate && params.input != InputKind::Points {
+        return JointSearch::of(pair, params)?.finished();
+    }
+    require_parts(pair, params)?;
+    if params.method == Method::Accurate {
+        return adjusted_points(pair, params);
     }
     let case = || pair.id.clone();
     let missing = || Error::MissingInput { case: case(), input: params.input };
@@ -212,65 +216,6 @@ fn reconstruct_as_given(pair: &ViewPair, params: &Params) -> Result<Reconstructi
         traces,
         diagnostics,
         explanation: Explanation::default(),
-    })
-}
-
-/// Our own method on masks, and on the maps that they were made of.
-fn joint_choice(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
-    let masks = pair
-        .masks
-        .as_ref()
-        .ok_or_else(|| Error::MissingInput { case: pair.id.clone(), input: params.input })?;
-    let maps = pair.probabilities.as_ref().filter(|_| params.input == InputKind::Image);
-    // What a person has drawn is the body; what a network has found need not be.
-    let cleaned;
-    let (masks, strays_px) = match maps {
-        Some(maps) => {
-            let (kept, strays_px) = without_strays(masks, maps, &pair.rig, &pair.id)?;
-            cleaned = kept;
-            (&cleaned, strays_px)
-        }
-        None => (masks, [0, 0]),
-    };
-    // As given: what takes effect has mended some of them.
-    let given = params.robust.validate();
-    given.map_err(|source| Error::Fitting { case: pair.id.clone(), source })?;
-    let robust = params.in_effect();
-    let by_grey_levels =
-        maps.is_some() && params.robust.by_grey_levels && params.closure == Closure::Open;
-    let images = pair.images.as_ref().filter(|_| by_grey_levels);
-    let maps = maps.filter(|_| params.robust.by_probability);
-    let result =
-        reconstruct_masks(masks, maps, images, &pair.rig, &robust, params.closure, &pair.id)?;
-    // The curve was fitted under the corrected camera, if one was asked for.
-    let rig = match &result.calibration {
-        Some(calibration) => &calibration
-            .correct(&pair.rig)
-            .map_err(|source| Error::Fitting { case: pair.id.clone(), source })?,
-        None => &pair.rig,
-    };
-    let sampling = match params.closure {
-        Closure::Open => sampled,
-        Closure::Closed => sampled_ring,
-    };
-    let SampledCurve { points, covariances } =
-        sampling(&result.fit.curve, result.fit.covariance.as_ref(), rig);
-    let along_epipolar_line = along_epipolar_lines(&points, rig)
-        .map_err(|source| Error::Matching { case: pair.id.clone(), source })?;
-    let mut diagnostics = Diagnostics::of_joint(&result, strays_px, &along_epipolar_line);
-    diagnostics.closed = params.closure == Closure::Closed;
-    let explanation = result.explanation.clone();
-    Ok(Reconstruction {
-        id: pair.id.clone(),
-        method: params.method,
-        input: params.input,
-        unit: pair.rig.unit(),
-        points,
-        covariances,
-        along_epipolar_line,
-        traces: Traces::walked(result),
-        diagnostics,
-        explanation,
     })
 }
 

@@ -206,6 +206,12 @@ fn a_library_that_is_no_onnx_runtime_is_said_and_not_a_crash() {
     let output = run("auto").assert().success();
     let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
     assert!(said.contains("going on with rten"), "{said}");
+    // Whoever names a library wants that one.
+    let mut named = run("auto");
+    named.env_remove("ORT_DYLIB_PATH").arg("--onnxruntime").arg(dir.path().join("none.so"));
+    let (code, message) = failure(&mut named);
+    assert_eq!(code, 69);
+    assert!(message.contains("none.so"), "{message}");
     let (code, message) = failure(run("ort").env_remove("ORT_DYLIB_PATH"));
     assert_eq!(code, 69);
     assert!(message.contains("--onnxruntime"), "{message}");
@@ -351,6 +357,7 @@ fn a_dicom_run_is_segmented_by_its_mean_or_by_one_frame() {
     }
     let (code, said) = failure(&mut segment(&["--frame", "2"], &run));
     assert_eq!(code, 65, "{said}");
+    assert_eq!(said.matches("run.dcm").count(), 1, "{said}");
     let image = dir.path().join("out/run_probability.png");
     let (code, said) = failure(&mut segment(&["--frame", "0"], &image));
     assert_eq!(code, 2, "{said}");

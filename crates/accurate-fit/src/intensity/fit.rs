@@ -146,6 +146,16 @@ impl IntensityPair {
     /// # Errors
     /// As [`fit_intensities`].
     pub fn fit(&self, start: &Curve3) -> Result<IntensityFit, FitError> {
+        self.fit_to_beat(start, f64::INFINITY)
+    }
+
+    /// The same for a curve that is of no use unless its cost falls below `to_beat`: the fit ends where it
+    /// is once the steps that are left, each gaining as much as the better one of the last two, would not
+    /// get there, nor a tenth of the cost on top of that, which a curve may gain that slips into place.
+    ///
+    /// # Errors
+    /// As [`fit_intensities`].
+    pub fn fit_to_beat(&self, start: &Curve3, to_beat: f64) -> Result<IntensityFit, FitError> {
         let Start { given, spline, samples, scale, .. } =
             Start::new(start, &self.projectors, &self.params)?;
         let problem = Problem {
@@ -167,7 +177,7 @@ impl IntensityPair {
                 .first_amplitude(&state, view)
                 .ok_or(FitError::NotSeenInImage { view: view as u8 + 1 })?;
         }
-        let (steps, converged) = problem.minimise(&mut state, &self.params)?;
+        let (steps, converged) = problem.minimise(&mut state, &self.params, to_beat)?;
         problem.finish(&state, &given, steps, converged)
     }
 }
@@ -341,18 +351,23 @@ impl Problem<'_> {
         normal
     }
 
-    /// Levenberg-Marquardt; the number of steps, and whether the last gained next to nothing.
+    /// Levenberg-Marquardt; the number of steps, and whether the last gained next to nothing. What cannot come
+    /// near the cost `to_beat` at its pace is left.
     fn minimise(
         &self,
         state: &mut State,
         params: &IntensityFitParams,
+        to_beat: f64,
     ) -> Result<(usize, bool), FitError> {
         const TRIES: usize = 6;
+        /// Of the cost. From 0.06 on none of 45 fits that win (of 818, tuning seeds) is given up.
+        const SUDDEN_GAIN: f64 = 0.1;
         let mut damping = 1e-3;
         let mut cost = self.cost(state);
-        for step in 0..params.iterations {
+        let mut gain = 0.0;
+        for step in 1..=params.iterations {
             let normal = self.equations(state);
-            let mut gain = 0.0;
+            let gain_before = std::mem::take(&mut gain);
             for _ in 0..TRIES {
                 let next = state.moved(&normal.step(damping)?);
                 let next_cost = self.cost(&next);
@@ -365,7 +380,11 @@ impl Problem<'_> {
                 damping *= 8.0;
             }
             if gain < params.tolerance {
-                return Ok((step + 1, true));
+                return Ok((step, true));
+            }
+            let hope = gain.max(gain_before) * (params.iterations - step) as f64;
+            if (1.0 - SUDDEN_GAIN) * cost - hope > to_beat {
+                return Ok((step, false));
             }
         }
         Ok((params.iterations, false))

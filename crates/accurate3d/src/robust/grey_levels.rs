@@ -52,8 +52,10 @@ pub(crate) fn choose_by_grey_levels(
     let calibration = start_of_calibration(params, seen.calibration());
     let settings = IntensityFitParams { tolerance: ASKED_TO, ..IntensityFitParams::DEFAULT };
     let pair = IntensityPair::around(&curves, images, given_rig, &settings, calibration).ok()?;
-    let fits = side_by_side(&curves, |curve| pair.fit(curve).ok());
-    let best = fits[0].as_ref()?;
+    let best = pair.fit(curves[0]).ok()?;
+    // What the cost of one must fall below for it to lead.
+    let to_beat = |k: usize| best.cost - COST_PER_SCORE * (LEAD + contenders[k].1);
+    let fits = side_by_side(&asked[1..], |&k| pair.fit_to_beat(curve(k), to_beat(k)).ok());
     let fitted_last = seen.fitted_last();
     // One that had no last fit is placed by the pictures or not at all; alone, where the other curves are
     // background.
@@ -69,7 +71,7 @@ pub(crate) fn choose_by_grey_levels(
             .is_ok_and(|fit| reason_against(&fit).is_none())
     };
     let mut behind = Vec::new();
-    for (&k, fit) in asked.iter().zip(&fits).skip(1) {
+    for (&k, fit) in asked[1..].iter().zip(&fits) {
         // What is carried off is no longer the curve that the maps spoke for.
         let fit = fit.as_ref().filter(|fit| fit.moved_px <= MOST_MOVED_PX);
         let Some(fit) = fit else { continue };

@@ -1,5 +1,5 @@
 use accurate_fit::{CalibrationEstimate, CalibrationPriors, FitError, OutlineFit};
-use accurate_geom::{Pixel, Rig, View1, View2};
+use accurate_geom::{Curve3, Pixel, Rig, View1, View2};
 use accurate_match::ProposeParams;
 use accurate_traverse::WalkParams;
 use ndarray::Array2;
@@ -10,7 +10,7 @@ use super::grey_levels::{choose_by_grey_levels, on_grey_levels};
 use super::hairpins::{DOUBLED, KINKS};
 use super::look::{Look, Seen};
 use super::suspicion::{DoubtLimits, Suspicion, calls_for_the_pictures};
-use super::upright::Upright;
+use super::upright::{Orientation, Upright};
 use crate::{Closure, Error, Explanation, IntensityDiagnostics};
 
 /// How hard the joint choice looks.
@@ -170,25 +170,33 @@ pub(crate) struct JointResult {
     pub(crate) grey_levels: Option<IntensityDiagnostics>,
 }
 
+/// What the search through masks, or maps, came to; pictures were not asked.
+pub(crate) struct Searched {
+    seen: Seen,
+    limits: &'static DoubtLimits,
+    orientation: Orientation,
+}
+
 /// Proposes, pairs, fits, judges; by the probability maps behind the masks, where they are given. In
 /// doubt once more with the images turned, and again, until nothing speaks against the likeliest curve.
-/// At last by the grey levels of `images`, if they are given.
+/// `drawn` masks may be turned before; those of pictures lie as these do.
 ///
 /// # Errors
 /// [`Error`] of a view that shows no curve; [`Error::NoCandidate`] if no pair of walks gives one;
 /// [`Error::NotClosed`] if a ring was asked for and a view shows none.
-pub(crate) fn reconstruct_masks(
+pub(crate) fn search_masks(
     masks: &[Array2<bool>; 2],
     probabilities: Option<&[Array2<f32>; 2]>,
-    images: Option<&[Array2<f32>; 2]>,
+    drawn: bool,
     rig: &Rig,
     params: &RobustParams,
     closure: Closure,
     case: &str,
-) -> Result<JointResult, Error> {
-    let upright = match (probabilities, images) {
-        (None, None) => Upright::of(masks, rig, params.calibration.is_none(), case)?,
-        _ => Upright::as_given(masks, rig),
+) -> Result<Searched, Error> {
+    let upright = if drawn {
+        Upright::of(masks, rig, params.calibration.is_none(), case)?
+    } else {
+        Upright::as_given(masks, rig)
     };
     let look = |turn| {
         let (masks, rig) = (&*upright.masks, &*upright.rig);
@@ -214,14 +222,40 @@ pub(crate) fn reconstruct_masks(
             seen = seen.beside(other);
         }
     }
-    let Some(images) = images else { return Ok(seen.into_result(limits, &upright)) };
-    let overruled_by = if calls_for_the_pictures(&seen.evidence()) {
-        choose_by_grey_levels(&mut seen, images, rig, params)
-    } else {
-        None
-    };
-    let mut result = seen.into_result(limits, &upright);
-    result.grey_levels =
-        Some(on_grey_levels(&mut result, images, probabilities, rig, params, overruled_by));
-    Ok(result)
+    Ok(Searched { seen, limits, orientation: upright.orientation })
+}
+
+impl Searched {
+    /// What bears on the choice so far.
+    pub(crate) fn evidence(&self) -> Evidence {
+        self.seen.evidence()
+    }
+
+    /// The curve so far.
+    pub(crate) fn curve(&self) -> &Curve3 {
+        &self.seen.best().fit.curve
+    }
+
+    pub(crate) fn into_result(self) -> JointResult {
+        self.seen.into_result(self.limits, &self.orientation)
+    }
+
+    /// At last by the grey levels of the images, of which the search has seen the maps, if any.
+    pub(crate) fn by_pictures(
+        mut self,
+        images: &[Array2<f32>; 2],
+        maps: Option<&[Array2<f32>; 2]>,
+        rig: &Rig,
+        params: &RobustParams,
+    ) -> JointResult {
+        let overruled_by = if calls_for_the_pictures(&self.seen.evidence()) {
+            choose_by_grey_levels(&mut self.seen, images, rig, params)
+        } else {
+            None
+        };
+        let mut result = self.into_result();
+        result.grey_levels =
+            Some(on_grey_levels(&mut result, images, maps, rig, params, overruled_by));
+        result
+    }
 }

@@ -12,7 +12,7 @@ use super::joint::JointResult;
 use super::score::Candidate;
 use super::search::{Effort, Search};
 use super::suspicion::{DoubtLimits, calls_for_a_second_look};
-use super::upright::Upright;
+use super::upright::Orientation;
 use crate::{Closure, Error, Explanation};
 
 /// What a look at the images takes.
@@ -87,9 +87,13 @@ impl Seen {
         seen
     }
 
+    pub(crate) fn best(&self) -> &Candidate {
+        &self.settled.fits[0]
+    }
+
     /// What bears on the choice, the curves of all looks among it.
     pub(crate) fn evidence(&self) -> Evidence {
-        let best = &self.settled.fits[0];
+        let best = self.best();
         // Without a last fit there is no likelihood.
         let behind = |rival: &Candidate| match best.unlikeliness() {
             least if least.is_finite() => rival.unlikeliness() - least,
@@ -129,12 +133,16 @@ impl Seen {
 
     /// Other curves than the best that other looks settled on.
     fn rivals(&self) -> impl Iterator<Item = &Candidate> {
-        let best = &self.settled.fits[0].shape;
+        let best = &self.best().shape;
         self.others.iter().filter(move |other| !other.shape.is_like(best, RIVAL_PX))
     }
 
     /// In the images as they were given.
-    pub(crate) fn into_result(self, limits: &DoubtLimits, upright: &Upright<'_>) -> JointResult {
+    pub(crate) fn into_result(
+        self,
+        limits: &DoubtLimits,
+        orientation: &Orientation,
+    ) -> JointResult {
         let evidence = self.evidence();
         let Settled { choice, fits, .. } = &self.settled;
         let rivals = choice.finalists[fits.len()..].iter().chain(self.rivals());
@@ -144,14 +152,14 @@ impl Seen {
         let best = fits.swap_remove(0);
         let [i, j] = best.walks;
         let mut coverage = [view1.walks[i].coverage, view2.walks[j].coverage];
-        let [frame1, frame2] = &upright.frames;
+        let [frame1, frame2] = &orientation.frames;
         let mut junctions = [view1.junctions(i, frame1), view2.junctions(j, frame2)];
         let mut walk1: Vec<_> = in_given(&view1.walks[i], frame1);
         let mut walk2: Vec<_> = in_given(&view2.walks[j], frame2);
         if best.reversed {
             walk2.reverse();
         }
-        if upright.swapped {
+        if orientation.swapped {
             candidates.iter_mut().for_each(|curve| curve.walks.reverse());
             coverage.reverse();
             junctions.reverse();
@@ -166,7 +174,7 @@ impl Seen {
             coverage,
             mean_distance_px: best.mean_distance_px,
             fits: tried,
-            calibration: calibration.map(|found| upright.given_calibration(&found)),
+            calibration: calibration.map(|found| orientation.given_calibration(&found)),
             suspicions: evidence.suspicions(limits),
             evidence,
             fit: best.fit,

@@ -31,7 +31,7 @@ pub(crate) use candidates::ViewCandidates;
 pub use evidence::Evidence;
 pub(crate) use finalists::SAME_PX;
 pub(crate) use frame::Turn;
-pub(crate) use joint::{JointResult, reconstruct_masks};
+pub(crate) use joint::{JointResult, Searched, search_masks};
 pub use joint::{RobustParams, SecondLook};
 pub(crate) use shape::px_per_unit;
 pub(crate) use strays::without_strays;

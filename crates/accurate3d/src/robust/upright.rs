@@ -15,6 +15,11 @@ use crate::Error;
 pub(crate) struct Upright<'a> {
     pub(crate) masks: Cow<'a, [Array2<bool>; 2]>,
     pub(crate) rig: Cow<'a, Rig>,
+    pub(crate) orientation: Orientation,
+}
+
+/// How images lie beside those that were given.
+pub(crate) struct Orientation {
     /// Where the images lie in the given ones.
     pub(crate) frames: [Frame; 2],
     /// Whether the first of the images is the second of the given ones.
@@ -47,19 +52,19 @@ impl<'a> Upright<'a> {
         } else {
             ([one, two], [frame1, frame2], turned)
         };
-        Ok(Self { masks: Cow::Owned(masks), rig: Cow::Owned(rig), frames, swapped })
+        let orientation = Orientation { frames, swapped };
+        Ok(Self { masks: Cow::Owned(masks), rig: Cow::Owned(rig), orientation })
     }
 
     /// As they lie: a network has seen the images so.
     pub(crate) fn as_given(masks: &'a [Array2<bool>; 2], rig: &'a Rig) -> Self {
-        Self {
-            masks: Cow::Borrowed(masks),
-            rig: Cow::Borrowed(rig),
-            frames: [0, 1].map(|view| Frame::new(Turn::NONE, [0.0; 2], &masks[view])),
-            swapped: false,
-        }
+        let frames = [0, 1].map(|view| Frame::new(Turn::NONE, [0.0; 2], &masks[view]));
+        let orientation = Orientation { frames, swapped: false };
+        Self { masks: Cow::Borrowed(masks), rig: Cow::Borrowed(rig), orientation }
     }
+}
 
+impl Orientation {
     /// What was found about camera 2 here, of the given one.
     pub(crate) fn given_calibration(&self, here: &CalibrationEstimate) -> CalibrationEstimate {
         here.in_axes(&self.frames[1].axes_in_image())
