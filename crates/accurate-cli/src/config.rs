@@ -22,8 +22,7 @@ const NOT_IN_A_FILE: [&str; 4] = ["config", "help", "version", "json"];
 const EXCLUSIVE: [&str; 2] = ["quiet", "verbose"];
 
 /// The words of the command line with those of its `--config` file put in, behind the command that
-/// they are for and before the user's own. `--strict=false` is a word for a switch as well: it turns off
-/// what the file turns on.
+/// they are for and before the user's own.
 ///
 /// # Errors
 /// A file that cannot be read, is not TOML, or has a key that is no option; two files.
@@ -32,38 +31,24 @@ pub fn expand(command: &Command, mut words: Vec<OsString>) -> Result<Vec<OsStrin
         return Err(Failure::new(Failure::USAGE, "--config is given twice")
             .with_hint("one file, with a table for each command: `accurate config schema`"));
     }
-    let path = config_path(&words);
+    let Some(path) = config_path(&words) else { return Ok(words) };
+    let text = read_text(&path)?;
     let wrong = |problem: String| {
-        let file = path.as_deref().unwrap_or(Path::new("")).display();
-        Failure::new(Code::Malformed, format!("{file}: {problem}"))
+        Failure::new(Code::Malformed, format!("{}: {problem}", path.display()))
             .with_hint("`accurate config schema` lists every key")
     };
-    let mut table = match &path {
-        Some(path) => {
-            read_text(path)?.parse().map_err(|e: toml::de::Error| wrong(e.to_string()))?
-        }
-        None => Table::new(),
-    };
+    let mut table: Table = text.parse().map_err(|e: toml::de::Error| wrong(e.to_string()))?;
     check(command, &table, "").map_err(wrong)?;
     let own: Vec<String> = words.iter().map(|w| w.to_string_lossy().into_owned()).collect();
     // Who says one of these does not mean the file's other one.
-    let is_on = |arg: &Arg| is_given(arg, &own) && !is_turned_off(arg, &own);
-    if options(command).any(|arg| EXCLUSIVE.contains(&name(arg).as_str()) && is_on(arg)) {
+    if options(command).any(|arg| EXCLUSIVE.contains(&name(arg).as_str()) && is_given(arg, &own)) {
         EXCLUSIVE.iter().for_each(|key| {
             table.remove(*key);
         });
     }
     // The global options first, then the command's, then those of a command below it.
     let (mut here, mut insert_at) = (command, 1);
-    let mut switches = Vec::new();
     loop {
-        for switch in options(here).filter(|arg| matches!(arg.get_action(), ArgAction::SetTrue)) {
-            let is_off = is_turned_off(switch, &own);
-            if is_off {
-                table.remove(&name(switch));
-            }
-            switches.push((name(switch), is_off));
-        }
         // Of an option that may be given several times, the user's own replace those of the file.
         for arg in options(here).filter(|arg| is_list(arg) && is_given(arg, &own)) {
             table.remove(&name(arg));
@@ -83,25 +68,7 @@ pub fn expand(command: &Command, mut words: Vec<OsString>) -> Result<Vec<OsStrin
         };
         (here, insert_at) = (below, position + 1);
     }
-    Ok(without_values(words, &switches))
-}
-
-/// The words with `--switch` for `--switch=true`, without `--switch=false`, and without any of a switch that
-/// is off at last.
-fn without_values(words: Vec<OsString>, switches: &[(String, bool)]) -> Vec<OsString> {
-    let mut are_options = true;
-    let plain = |word: OsString| {
-        are_options &= word != "--";
-        let text = word.to_str().filter(|_| are_options).unwrap_or_default();
-        let said = text.strip_prefix("--").unwrap_or_default();
-        let (said, value) = said.split_once('=').unwrap_or((said, "true"));
-        match (switches.iter().find(|(name, _)| name == said), value) {
-            (Some((_, true)), "true" | "false") | (Some(_), "false") => None,
-            (Some((name, false)), "true") => Some(format!("--{name}").into()),
-            _ => Some(word),
-        }
-    };
-    words.into_iter().filter_map(plain).collect()
+    Ok(words)
 }
 
 /// The options in effect, as a config file that gives the same run.
@@ -216,12 +183,6 @@ fn config_paths(words: &[OsString]) -> impl Iterator<Item = PathBuf> + '_ {
 /// Where else a wrong option may stand.
 pub fn counts_too(path: &Path) -> String {
     format!("what {} says counts as if it were typed", path.display())
-}
-
-/// Whether the last that the words of a command line say of a switch is that it is off.
-fn is_turned_off(switch: &Arg, words: &[String]) -> bool {
-    let off = format!("--{}=false", name(switch));
-    words.iter().rev().find(|word| is_given(switch, &[(*word).clone()])) == Some(&off)
 }
 
 /// Whether the words of a command line give an option, by its long or its short name.
@@ -391,27 +352,6 @@ mod tests {
         assert!(at("--input=mask") < at("--input"));
         assert!(at("--strict") < at("pair") && at("--also=ply,npy") < at("pair"));
         assert!(!words.iter().any(|w| w.contains("cases")));
-    }
-
-    #[test]
-    fn a_switch_that_the_file_turns_on_is_turned_off_by_the_user() {
-        let config = "quiet = true\n[reconstruct]\nstrict = true\n";
-        let all = |words: &[&str]| expanded(config, words).unwrap();
-        let without = |words: &[&str]| !all(words).iter().any(|word| word.contains("strict"));
-        assert!(without(&["reconstruct", "--strict=false", "pair"]));
-        assert!(without(&["reconstruct", "--strict", "--strict=false", "pair"]));
-        assert!(!without(&["reconstruct", "--strict=false", "--strict", "pair"]));
-        assert!(all(&["reconstruct", "--strict=false", "pair"]).contains(&"--quiet".to_owned()));
-        assert!(!all(&["--quiet=false", "reconstruct", "pair"]).contains(&"--quiet".to_owned()));
-        // Behind `--` is no option, and another value is left to be refused.
-        let kept = ["--".to_owned(), "--strict=false".to_owned()];
-        assert!(all(&["reconstruct", &kept[0], &kept[1]]).ends_with(&kept));
-        assert!(all(&["reconstruct", "--strict=no"]).contains(&"--strict=no".to_owned()));
-
-        let plain =
-            ["accurate", "--quiet=true", "reconstruct", "--strict=false"].map(OsString::from);
-        let words = expand(&Cli::command(), plain.to_vec()).unwrap();
-        assert_eq!(words, ["accurate", "--quiet", "reconstruct"]);
     }
 
     #[test]

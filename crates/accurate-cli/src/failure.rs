@@ -57,10 +57,9 @@ impl Failure {
         self.of(&path.display().to_string())
     }
 
-    /// The same with what it is about in front, unless it begins or ends with that as it is.
+    /// The same with what it is about in front, if it does not begin with that already.
     pub fn of(self, name: &str) -> Self {
-        let ends = self.message.strip_suffix(name).is_some_and(|rest| rest.ends_with(' '));
-        if ends || self.message.starts_with(&format!("{name}: ")) {
+        if self.message.starts_with(&format!("{name}: ")) {
             return self;
         }
         let message = format!("{name}: {}", self.message);

@@ -81,8 +81,6 @@ fn engine(
         EngineChoice::Auto => EngineChoice::Rten,
         chosen => chosen,
     };
-    // Who names a library wants that one; the environment's may be meant for others.
-    let is_asked_for = args.engine == EngineChoice::Ort || args.onnxruntime.is_some();
     if chosen == EngineChoice::Ort {
         let Some(library) = named else {
             return Err(Failure::new(
@@ -95,9 +93,10 @@ fn engine(
         };
         match onnx_runtime(&library, bundle, threads) {
             Ok(engine) => return Ok(Box::new(engine)),
-            Err(error) if is_asked_for => {
+            // Whoever names a library wants that one; the environment's may be meant for others.
+            Err(error) if args.engine == EngineChoice::Ort || args.onnxruntime.is_some() => {
                 return Err(Failure::new(Failure::UNAVAILABLE, error.to_string())
-                    .with_hint("version 1.24 or later is needed; or take --engine rten"));
+                    .with_hint("version 1.24 or later is needed, and it must know the model's operations; or take --engine rten"));
             }
             Err(error) => console.remark(&format!("{error}; going on with rten")),
         }

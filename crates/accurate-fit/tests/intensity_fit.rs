@@ -148,16 +148,13 @@ fn a_fit_that_can_win_is_the_same_and_one_that_cannot_ends_early() {
         let params = IntensityFitParams::DEFAULT;
         let pair = IntensityPair::around(&[&start], &images, &case.rig, &params, None).unwrap();
         let whole = pair.fit(&start).unwrap();
-        let first = pair.fit_to_beat(&start, f64::NEG_INFINITY).unwrap();
-        assert!(first.steps == 1 && !first.converged, "{first:?}");
-        assert!(first.cost > whole.cost && whole.steps > 3, "{} {}", first.cost, whole.cost);
         // It wins, if not by much.
-        let wins = pair.fit_to_beat(&start, whole.cost + 0.1).unwrap();
+        let wins = pair.fit_to_beat(&start, whole.cost + 0.1).unwrap().unwrap();
         assert_eq!((wins.curve, wins.cost, wins.steps), (whole.curve, whole.cost, whole.steps));
-        // One that is twice too dear is known before the last step to be so, and is dearer still.
-        let loses = pair.fit_to_beat(&start, 0.5 * whole.cost).unwrap();
-        assert!(loses.steps < whole.steps && !loses.converged, "{} {}", loses.steps, whole.steps);
-        assert!(loses.cost >= whole.cost, "{} {}", loses.cost, whole.cost);
+        // What is twice too dear is known before the last step to be so.
+        for to_beat in [0.5 * whole.cost, 0.0, f64::NEG_INFINITY] {
+            assert!(pair.fit_to_beat(&start, to_beat).unwrap().is_none(), "{}", whole.cost);
+        }
     }
 }
 

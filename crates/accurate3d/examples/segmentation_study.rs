@@ -3,7 +3,7 @@
 //! `cargo run --release -p accurate3d --features rten --example segmentation_study -- WHAT MODEL SEED COUNT [GENERATOR | IMAGE...]`
 //!
 //! WHAT is `score` (recall and precision at 2 px, clDice, mean distance of the skeletons' pixels both
-//! ways, with the model's own post-processing, means with 95 % intervals) or
+//! ways, with the model's own post-processing: means and the median distance, with 95 % intervals) or
 //! `tune` (the same over a grid of thresholds, smallest pieces and spurs; the best are printed last;
 //! seed 1500 is for this). GENERATOR is `training` (the default), `held-out`, `phantom`, or a family of
 //! cases (`medium`, `carm`, ...), of whose pictures both views are taken. With images, wires are drawn
@@ -188,18 +188,24 @@ impl Scores {
 
     /// Means with 95 % intervals over the images, and the median distance.
     fn print(&self) -> Result<(), Box<dyn Error>> {
+        println!("nothing found in {} of {}", self.nothing_found(), self.0.len());
         for (name, score) in [
             ("recall at 2 px", Self::RECALL),
             ("precision at 2 px", Self::PRECISION),
             ("clDice", Self::CL_DICE),
             ("centreline, px", Self::CENTRELINE_PX),
         ] {
-            let of = bootstrap_mean(&self.of_each(score), 10_000, name)?;
-            println!("{name}: {:.4} [{:.4}, {:.4}]", of.mean, of.low, of.high);
+            let values = self.of_each(score);
+            if !values.is_empty() {
+                let of = bootstrap_mean(&values, 10_000, name)?;
+                println!("{name}: {:.4} [{:.4}, {:.4}]", of.mean, of.low, of.high);
+            }
         }
-        let of = quantile_interval(&self.of_each(Self::CENTRELINE_PX), 0.5)?;
-        println!("centreline, median image, px: {:.4} [{:.4}, {:.4}]", of.value, of.low, of.high);
-        println!("nothing found in {}", self.nothing_found());
+        let distances = self.of_each(Self::CENTRELINE_PX);
+        if !distances.is_empty() {
+            let of = quantile_interval(&distances, 0.5)?;
+            println!("centreline, median, px: {:.4} [{:.4}, {:.4}]", of.value, of.low, of.high);
+        }
         Ok(())
     }
 }

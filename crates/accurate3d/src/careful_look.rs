@@ -15,7 +15,8 @@ pub struct CarefulLook {
     /// Whether the curve is the one of the careful segmentation; else the other one explained its
     /// maps better.
     pub taken: bool,
-    /// Hausdorff distance of the two curves, px; none if one segmentation gave no curve.
+    /// Hausdorff distance of the two curves, px; none if one segmentation gave no curve. Where it is at most
+    /// 2 px by the maps, the pictures were asked about one of them, and this is the distance before that.
     pub apart_px: Option<f64>,
 }
 
@@ -26,7 +27,9 @@ pub struct CarefulLook {
 /// or where it found none, the images are segmented once more with more care
 /// ([`Segmenter::segment_again`]): another segmentation breaks the body elsewhere. Of the two curves
 /// that one stays which leaves less unexplained and bends less. Whether they are the same decides
-/// whether the order of the strands is ambiguous ([`Suspicion::Ambiguous`]).
+/// whether the order of the strands is ambiguous ([`Suspicion::Ambiguous`]). What calls for the second
+/// segmentation are the maps; the pictures' grey levels are asked last, and about one curve where both
+/// segmentations give it, unless they speak for another one.
 ///
 /// # Errors
 /// As [`reconstruct`]; [`Error::Segmentation`] if `watch` ends the second segmentation, or its engine
@@ -56,12 +59,7 @@ pub fn reconstruct_images(
         // No other way, or nothing found: the first look is all there is.
         Ok(None) | Err(_) => return as_it_is(first),
     };
-    let (mut curve, look) = match (first, JointSearch::of(&again, params)) {
-        (Ok(first), Ok(second)) => the_better(first, second, pair)?,
-        (Ok(only), Err(_)) => (only.finished()?, CarefulLook { taken: false, apart_px: None }),
-        (Err(_), Ok(only)) => (only.finished()?, CarefulLook { taken: true, apart_px: None }),
-        (Err(error), Err(_)) => return Err(error),
-    };
+    let (mut curve, look) = the_better(first, JointSearch::of(&again, params), pair)?;
     curve.diagnostics.careful_look = Some(look);
     Ok((curve, look.taken.then_some(again)))
 }
@@ -82,24 +80,50 @@ fn is_worth_a_look(first: &Result<JointSearch<'_>, Error>) -> bool {
 
 /// Of two segmentations of a pair the curve that leaves less unexplained and bends less.
 fn the_better(
-    first: JointSearch<'_>,
-    second: JointSearch<'_>,
+    first: Result<JointSearch<'_>, Error>,
+    second: Result<JointSearch<'_>, Error>,
     pair: &ViewPair,
 ) -> Result<(Reconstruction, CarefulLook), Error> {
-    let apart_px = apart(&first.positions(), &second.positions(), pair);
-    if apart_px.is_some_and(|px| px <= SAME_PX) {
-        // Nor have the pictures two curves to choose between: they are asked about one.
-        let taken = second.evidence().cost() < first.evidence().cost();
-        let mut curve = if taken { second } else { first }.finished()?;
-        doubt(&mut curve, apart_px);
-        return Ok((curve, CarefulLook { taken, apart_px }));
-    }
-    let (first, second) = (first.finished()?, second.finished()?);
-    let apart_px = apart(&first.positions(), &second.positions(), pair);
-    let taken = cost(&second) < cost(&first);
-    let mut curve = if taken { second } else { first };
-    doubt(&mut curve, apart_px);
-    Ok((curve, CarefulLook { taken, apart_px }))
+    let [first, second] = match (first, second) {
+        (Ok(first), Ok(second)) => {
+            let apart_px = apart(&first.positions(), &second.positions(), pair);
+            let taken = second.evidence().cost() < first.evidence().cost();
+            if apart_px.is_none_or(|px| px > SAME_PX) {
+                [first.finished(), second.finished()]
+            } else {
+                let (kept, other) = if taken { (second, first) } else { (first, second) };
+                let kept = kept.finished();
+                match kept {
+                    // The pictures of one were asked, and have nothing against what both give.
+                    Ok(mut curve) if !is_overruled(&curve) => {
+                        doubt(&mut curve, apart_px);
+                        return Ok((curve, CarefulLook { taken, apart_px }));
+                    }
+                    kept if taken => [other.finished(), kept],
+                    kept => [kept, other.finished()],
+                }
+            }
+        }
+        (first, second) => [first, second].map(|search| search?.finished()),
+    };
+    Ok(match (first, second) {
+        (Ok(first), Ok(second)) => {
+            let apart_px = apart(&first.positions(), &second.positions(), pair);
+            let taken = cost(&second) < cost(&first);
+            let mut curve = if taken { second } else { first };
+            doubt(&mut curve, apart_px);
+            (curve, CarefulLook { taken, apart_px })
+        }
+        (Ok(first), Err(_)) => (first, CarefulLook { taken: false, apart_px: None }),
+        (Err(_), Ok(second)) => (second, CarefulLook { taken: true, apart_px: None }),
+        (Err(error), Err(_)) => return Err(error),
+    })
+}
+
+/// Whether the pictures took another curve than the maps.
+fn is_overruled(curve: &Reconstruction) -> bool {
+    let by_pictures = curve.diagnostics.grey_levels.as_ref();
+    by_pictures.is_some_and(|grey_levels| grey_levels.overruled_by.is_some())
 }
 
 /// What speaks against a curve, of what can be compared between segmentations.

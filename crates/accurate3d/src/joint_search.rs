@@ -1,7 +1,7 @@
 use accurate_geom::Point3;
 use ndarray::Array2;
 
-use crate::reconstruct::require_parts;
+use crate::require::require_usable;
 use crate::robust::{Evidence, Searched, search_masks, without_strays};
 use crate::sampled_curve::{SampledCurve, along_epipolar_lines, sampled, sampled_ring};
 use crate::{
@@ -12,6 +12,10 @@ use crate::{
 pub(crate) struct JointSearch<'a> {
     pair: &'a ViewPair,
     params: &'a Params,
+    /// The maps that curves are judged by, if any.
+    maps: Option<&'a [Array2<f32>; 2]>,
+    /// The pictures that are asked, if any.
+    images: Option<&'a [Array2<f32>; 2]>,
     in_effect: RobustParams,
     searched: Searched,
     strays_px: [usize; 2],
@@ -21,7 +25,7 @@ impl<'a> JointSearch<'a> {
     /// # Errors
     /// As [`reconstruct`](crate::reconstruct).
     pub(crate) fn of(pair: &'a ViewPair, params: &'a Params) -> Result<Self, Error> {
-        require_parts(pair, params)?;
+        require_usable(pair, params.input)?;
         let masks = pair
             .masks
             .as_ref()
@@ -41,16 +45,20 @@ impl<'a> JointSearch<'a> {
         let given = params.robust.validate();
         given.map_err(|source| Error::Fitting { case: pair.id.clone(), source })?;
         let in_effect = params.in_effect();
+        let by_grey_levels =
+            maps.is_some() && params.robust.by_grey_levels && params.closure == Closure::Open;
+        let images = pair.images.as_ref().filter(|_| by_grey_levels);
+        let maps = maps.filter(|_| params.robust.by_probability);
         let searched = search_masks(
             masks,
-            maps_judged_by(pair, params),
-            maps_judged_by(pair, params).is_none() && pictures(pair, params).is_none(),
+            maps,
+            maps.is_none() && images.is_none(),
             &pair.rig,
             &in_effect,
             params.closure,
             &pair.id,
         )?;
-        Ok(Self { pair, params, in_effect, searched, strays_px })
+        Ok(Self { pair, params, maps, images, in_effect, searched, strays_px })
     }
 
     /// What bears on the choice so far.
@@ -69,9 +77,8 @@ impl<'a> JointSearch<'a> {
     /// # Errors
     /// [`Error::Fitting`], [`Error::Matching`].
     pub(crate) fn finished(self) -> Result<Reconstruction, Error> {
-        let Self { pair, params, in_effect, searched, strays_px } = self;
-        let maps = maps_judged_by(pair, params);
-        let result = match pictures(pair, params) {
+        let Self { pair, params, maps, images, in_effect, searched, strays_px } = self;
+        let result = match images {
             Some(images) => searched.by_pictures(images, maps, &pair.rig, &in_effect),
             None => searched.into_result(),
         };
@@ -106,19 +113,4 @@ impl<'a> JointSearch<'a> {
             explanation,
         })
     }
-}
-
-/// The maps that curves are judged by, if any.
-fn maps_judged_by<'a>(pair: &'a ViewPair, params: &Params) -> Option<&'a [Array2<f32>; 2]> {
-    let by_maps = params.input == InputKind::Image && params.robust.by_probability;
-    pair.probabilities.as_ref().filter(|_| by_maps)
-}
-
-/// The pictures that are asked, if any.
-fn pictures<'a>(pair: &'a ViewPair, params: &Params) -> Option<&'a [Array2<f32>; 2]> {
-    let by_pictures = params.input == InputKind::Image
-        && pair.probabilities.is_some()
-        && params.robust.by_grey_levels
-        && params.closure == Closure::Open;
-    pair.images.as_ref().filter(|_| by_pictures)
 }

@@ -12,7 +12,7 @@ use crate::direction::runs_against;
 use crate::disorder::is_disordered;
 use crate::joint_search::JointSearch;
 use crate::ordered_points::adjusted_points;
-use crate::require::{require_one_size, require_segmented};
+use crate::require::require_usable;
 use crate::sampled_curve::along_epipolar_lines;
 use crate::{
     Diagnostics, Error, Explanation, InputKind, Method, Reconstruction, RobustParams, Suspicion,
@@ -162,19 +162,11 @@ pub fn reconstruct(pair: &ViewPair, params: &Params) -> Result<Reconstruction, E
     Ok(found)
 }
 
-/// What [`reconstruct`] asks of a pair before anything else.
-pub(crate) fn require_parts(pair: &ViewPair, params: &Params) -> Result<(), Error> {
-    if params.input == InputKind::Image {
-        require_segmented(pair)?;
-    }
-    require_one_size(pair)
-}
-
 fn reconstruct_as_given(pair: &ViewPair, params: &Params) -> Result<Reconstruction, Error> {
     if params.method == Method::Accurate && params.input != InputKind::Points {
         return JointSearch::of(pair, params)?.finished();
     }
-    require_parts(pair, params)?;
+    require_usable(pair, params.input)?;
     if params.method == Method::Accurate {
         return adjusted_points(pair, params);
     }

@@ -2,8 +2,16 @@
 
 use crate::{Error, InputKind, ViewPair};
 
+/// Images were segmented, and what belongs to a view has one size.
+pub(crate) fn require_usable(pair: &ViewPair, input: InputKind) -> Result<(), Error> {
+    if input == InputKind::Image {
+        require_segmented(pair)?;
+    }
+    require_one_size(pair)
+}
+
 /// Images have probability maps.
-pub(crate) fn require_segmented(pair: &ViewPair) -> Result<(), Error> {
+fn require_segmented(pair: &ViewPair) -> Result<(), Error> {
     match (&pair.images, &pair.probabilities) {
         (_, Some(_)) => Ok(()),
         (Some(_), None) => Err(Error::NotSegmented { case: pair.id.clone() }),
@@ -12,7 +20,7 @@ pub(crate) fn require_segmented(pair: &ViewPair) -> Result<(), Error> {
 }
 
 /// What belongs to a view has the size of its camera's image.
-pub(crate) fn require_one_size(pair: &ViewPair) -> Result<(), Error> {
+fn require_one_size(pair: &ViewPair) -> Result<(), Error> {
     let cameras = [pair.rig.camera1(), pair.rig.camera2()];
     for (view, camera) in cameras.into_iter().enumerate() {
         let size = camera.size();

@@ -13,7 +13,8 @@ pub struct ModelArgs {
     /// What runs the network: `auto` takes ONNX Runtime where its library is named, else rten.
     #[arg(long, value_enum, default_value_t = EngineChoice::Auto)]
     pub engine: EngineChoice,
-    /// Library of ONNX Runtime, libonnxruntime.so.* (default: the variable ORT_DYLIB_PATH).
+    /// Library of ONNX Runtime, libonnxruntime.so.* (default: the variable ORT_DYLIB_PATH, which `auto`
+    /// passes over where it names none).
     #[arg(long, value_name = "LIBRARY")]
     pub onnxruntime: Option<PathBuf>,
     /// Which mirror images of an image the network sees as well; in doubt `reconstruct` takes all.

@@ -146,16 +146,30 @@ impl IntensityPair {
     /// # Errors
     /// As [`fit_intensities`].
     pub fn fit(&self, start: &Curve3) -> Result<IntensityFit, FitError> {
-        self.fit_to_beat(start, f64::INFINITY)
+        let (problem, mut state, given) = self.begin(start)?;
+        let end = problem.minimise(&mut state, &self.params, f64::INFINITY)?;
+        problem.finish(&state, &given, &end)
     }
 
-    /// The same for a curve that is of no use unless its cost falls below `to_beat`: the fit ends where it
-    /// is once the steps that are left, each gaining as much as the better one of the last two, would not
-    /// get there, nor a tenth of the cost on top of that, which a curve may gain that slips into place.
+    /// The same for a curve that is of no use unless its cost falls below `to_beat`. The fit ends early, and
+    /// gives nothing, once the steps that are left could not bring it there: not if each gained as much as
+    /// the better one of the last two, and the cost fell by another tenth at once, as it may where a curve
+    /// slips into place. That is a guess and no bound.
     ///
     /// # Errors
     /// As [`fit_intensities`].
-    pub fn fit_to_beat(&self, start: &Curve3, to_beat: f64) -> Result<IntensityFit, FitError> {
+    pub fn fit_to_beat(
+        &self,
+        start: &Curve3,
+        to_beat: f64,
+    ) -> Result<Option<IntensityFit>, FitError> {
+        let (problem, mut state, given) = self.begin(start)?;
+        let end = problem.minimise(&mut state, &self.params, to_beat)?;
+        if end.is_given_up { Ok(None) } else { problem.finish(&state, &given, &end).map(Some) }
+    }
+
+    /// The problem, where its solution starts, and the curve as it was given.
+    fn begin(&self, start: &Curve3) -> Result<(Problem<'_>, State, Vec<Point3>), FitError> {
         let Start { given, spline, samples, scale, .. } =
             Start::new(start, &self.projectors, &self.params)?;
         let problem = Problem {
@@ -177,8 +191,7 @@ impl IntensityPair {
                 .first_amplitude(&state, view)
                 .ok_or(FitError::NotSeenInImage { view: view as u8 + 1 })?;
         }
-        let (steps, converged) = problem.minimise(&mut state, &self.params, to_beat)?;
-        problem.finish(&state, &given, steps, converged)
+        Ok((problem, state, given))
     }
 }
 
@@ -228,6 +241,14 @@ struct Problem<'a> {
     cauchy_scale: f64,
     /// Of shift x, shift y and roll, if they are unknowns.
     prior_weights: Option<[f64; 3]>,
+}
+
+/// How a fit ended.
+struct End {
+    steps: usize,
+    converged: bool,
+    /// Before it rested, since it could not win.
+    is_given_up: bool,
 }
 
 #[derive(Clone)]
@@ -351,14 +372,14 @@ impl Problem<'_> {
         normal
     }
 
-    /// Levenberg-Marquardt; the number of steps, and whether the last gained next to nothing. What cannot come
-    /// near the cost `to_beat` at its pace is left.
+    /// Levenberg-Marquardt, until a step gains next to nothing or what is left cannot come near the cost
+    /// `to_beat` at its pace.
     fn minimise(
         &self,
         state: &mut State,
         params: &IntensityFitParams,
         to_beat: f64,
-    ) -> Result<(usize, bool), FitError> {
+    ) -> Result<End, FitError> {
         const TRIES: usize = 6;
         /// Of the cost. From 0.06 on none of 45 fits that win (of 818, tuning seeds) is given up.
         const SUDDEN_GAIN: f64 = 0.1;
@@ -380,23 +401,17 @@ impl Problem<'_> {
                 damping *= 8.0;
             }
             if gain < params.tolerance {
-                return Ok((step, true));
+                return Ok(End { steps: step, converged: true, is_given_up: false });
             }
             let hope = gain.max(gain_before) * (params.iterations - step) as f64;
             if (1.0 - SUDDEN_GAIN) * cost - hope > to_beat {
-                return Ok((step, false));
+                return Ok(End { steps: step, converged: false, is_given_up: true });
             }
         }
-        Ok((params.iterations, false))
+        Ok(End { steps: params.iterations, converged: false, is_given_up: false })
     }
 
-    fn finish(
-        &self,
-        state: &State,
-        given: &[Point3],
-        steps: usize,
-        converged: bool,
-    ) -> Result<IntensityFit, FitError> {
+    fn finish(&self, state: &State, given: &[Point3], end: &End) -> Result<IntensityFit, FitError> {
         let inverse = self.equations(state).inverse()?;
         let controls = state.spline.control.len();
         let nuisance = 3 * controls + GLOBALS - 3;
@@ -426,8 +441,8 @@ impl Problem<'_> {
             radius_px: state.blur_px.map(radius_px),
             contrast_to_noise,
             moved_px,
-            steps,
-            converged,
+            steps: end.steps,
+            converged: end.converged,
         })
     }
 }

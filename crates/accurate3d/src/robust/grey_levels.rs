@@ -55,7 +55,7 @@ pub(crate) fn choose_by_grey_levels(
     let best = pair.fit(curves[0]).ok()?;
     // What the cost of one must fall below for it to lead.
     let to_beat = |k: usize| best.cost - COST_PER_SCORE * (LEAD + contenders[k].1);
-    let fits = side_by_side(&asked[1..], |&k| pair.fit_to_beat(curve(k), to_beat(k)).ok());
+    let fits = side_by_side(&asked[1..], |&k| pair.fit_to_beat(curve(k), to_beat(k)).ok()?);
     let fitted_last = seen.fitted_last();
     // One that had no last fit is placed by the pictures or not at all; alone, where the other curves are
     // background.

@@ -179,7 +179,7 @@ pub(crate) struct Searched {
 
 /// Proposes, pairs, fits, judges; by the probability maps behind the masks, where they are given. In
 /// doubt once more with the images turned, and again, until nothing speaks against the likeliest curve.
-/// `drawn` masks may be turned before; those of pictures lie as these do.
+/// Where `turn_upright`, masks are brought upright first; not where maps or pictures are asked, which are not.
 ///
 /// # Errors
 /// [`Error`] of a view that shows no curve; [`Error::NoCandidate`] if no pair of walks gives one;
@@ -187,13 +187,13 @@ pub(crate) struct Searched {
 pub(crate) fn search_masks(
     masks: &[Array2<bool>; 2],
     probabilities: Option<&[Array2<f32>; 2]>,
-    drawn: bool,
+    turn_upright: bool,
     rig: &Rig,
     params: &RobustParams,
     closure: Closure,
     case: &str,
 ) -> Result<Searched, Error> {
-    let upright = if drawn {
+    let upright = if turn_upright {
         Upright::of(masks, rig, params.calibration.is_none(), case)?
     } else {
         Upright::as_given(masks, rig)
