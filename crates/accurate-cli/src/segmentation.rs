@@ -95,8 +95,10 @@ fn engine(
             Ok(engine) => return Ok(Box::new(engine)),
             // Whoever names a library wants that one; the environment's may be meant for others.
             Err(error) if args.engine == EngineChoice::Ort || args.onnxruntime.is_some() => {
-                return Err(Failure::new(Failure::UNAVAILABLE, error.to_string())
-                    .with_hint("version 1.24 or later is needed, and it must know the model's operations; or take --engine rten"));
+                return Err(Failure::new(Failure::UNAVAILABLE, error.to_string()).with_hint(
+                    "version 1.24 or later is needed, one that knows the model's operations; \
+                         or take --engine rten",
+                ));
             }
             Err(error) => console.remark(&format!("{error}; going on with rten")),
         }

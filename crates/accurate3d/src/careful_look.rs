@@ -87,22 +87,18 @@ fn the_better(
     let [first, second] = match (first, second) {
         (Ok(first), Ok(second)) => {
             let apart_px = apart(&first.positions(), &second.positions(), pair);
+            let agree = apart_px.is_some_and(|px| px <= SAME_PX);
             let taken = second.evidence().cost() < first.evidence().cost();
-            if apart_px.is_none_or(|px| px > SAME_PX) {
-                [first.finished(), second.finished()]
-            } else {
-                let (kept, other) = if taken { (second, first) } else { (first, second) };
-                let kept = kept.finished();
-                match kept {
-                    // The pictures of one were asked, and have nothing against what both give.
-                    Ok(mut curve) if !is_overruled(&curve) => {
-                        doubt(&mut curve, apart_px);
-                        return Ok((curve, CarefulLook { taken, apart_px }));
-                    }
-                    kept if taken => [other.finished(), kept],
-                    kept => [kept, other.finished()],
-                }
+            let (kept, other) = if taken { (second, first) } else { (first, second) };
+            let kept = kept.finished();
+            // The pictures were asked about one, and have nothing against what both give.
+            if agree && kept.as_ref().is_ok_and(|curve| !is_overruled(curve)) {
+                let mut curve = kept?;
+                doubt(&mut curve, apart_px);
+                return Ok((curve, CarefulLook { taken, apart_px }));
             }
+            let other = other.finished();
+            if taken { [other, kept] } else { [kept, other] }
         }
         (first, second) => [first, second].map(|search| search?.finished()),
     };
