@@ -93,7 +93,8 @@ def run(engine, paths, folder):
     command = [program, "-q", "--threads", str(args.threads), "segment", "--mirror", "never"]
     command += map(str, paths)
     command += ["--model", str(args.model), "--engine", engine, "-o", str(folder / "out")]
-    command += ["--onnxruntime", str(library)]
+    if engine == "ort":
+        command += ["--onnxruntime", str(library)]
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     # The peak that wait4 gives begins with that of this process, which a child of it inherits.
     peak, done = 0.0, 0

@@ -11,6 +11,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command};
 use serde_json::{Map, Value, json};
 use toml::{Table, Value as Toml};
 
+use crate::args::is_switch;
 use crate::code::Code;
 use crate::failure::Failure;
 use crate::text::read_text;
@@ -82,7 +83,7 @@ pub fn effective(command: &Command, matches: &ArgMatches) -> String {
             if matches.value_source(id).is_none() {
                 continue;
             }
-            let flag = matches!(arg.get_action(), ArgAction::SetTrue);
+            let flag = is_switch(arg);
             let count = matches!(arg.get_action(), ArgAction::Count);
             let value = if flag {
                 Toml::Boolean(matches.get_flag(id))
@@ -127,7 +128,7 @@ pub fn schema(command: &Command) -> Value {
         let mut properties = Map::new();
         for arg in options(command) {
             let mut property = match arg.get_action() {
-                ArgAction::SetTrue => json!({"type": "boolean"}),
+                _ if is_switch(arg) => json!({"type": "boolean"}),
                 ArgAction::Count => json!({"type": "integer", "minimum": 0}),
                 _ => {
                     let names: Vec<String> =
@@ -254,10 +255,10 @@ fn words_of(command: &Command, table: &Table) -> Result<Vec<OsString>, String> {
             continue;
         }
         match (arg.get_action(), value) {
-            (ArgAction::SetTrue, Toml::Boolean(on)) => {
+            (_, Toml::Boolean(on)) if is_switch(arg) => {
                 words.extend(on.then(|| format!("--{key}").into()));
             }
-            (ArgAction::SetTrue, _) => return Err(format!("`{key}` is true or false")),
+            _ if is_switch(arg) => return Err(format!("`{key}` is true or false")),
             (ArgAction::Count, Toml::Integer(n @ 0..=9)) => {
                 words.extend((0..*n).map(|_| OsString::from(format!("--{key}"))));
             }
@@ -323,10 +324,8 @@ fn is_list(arg: &Arg) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
-    use crate::args::Cli;
+    use crate::args::command_line;
 
     fn expanded(config: &str, words: &[&str]) -> Result<Vec<String>, String> {
         let dir = tempfile::tempdir().unwrap();
@@ -334,7 +333,7 @@ mod tests {
         std::fs::write(&path, config).unwrap();
         let mut all: Vec<OsString> = vec!["accurate".into(), "--config".into(), path.into()];
         all.extend(words.iter().map(OsString::from));
-        expand(&Cli::command(), all)
+        expand(&command_line(), all)
             .map(|words| {
                 let words = words.iter().map(|w| w.to_string_lossy().into_owned());
                 words.filter(|w| !w.contains("accurate")).collect()
@@ -355,6 +354,39 @@ mod tests {
     }
 
     #[test]
+    fn a_switch_of_the_file_is_turned_off_by_its_value() {
+        let config = "quiet = true\n[reconstruct]\nstrict = true\nrefine-calibration = true\n";
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("accurate.toml");
+        std::fs::write(&path, config).unwrap();
+        let switches = |own: &[&str]| {
+            let mut words: Vec<OsString> =
+                vec!["accurate".into(), "--config".into(), (&path).into()];
+            words.extend(own.iter().map(OsString::from));
+            words.extend(["-o", "out", "-i", "mask"].map(OsString::from));
+            let words = expand(&command_line(), words).unwrap();
+            let matches = command_line().try_get_matches_from(words).unwrap();
+            let below = matches.subcommand_matches("reconstruct").unwrap();
+            let folder = below.get_raw("inputs").unwrap().next().unwrap().to_owned();
+            assert_eq!(folder, "pair", "a switch takes no word of its own");
+            (
+                matches.get_flag("quiet"),
+                ["strict", "refine_calibration"].map(|id| below.get_flag(id)),
+            )
+        };
+        assert_eq!(switches(&["reconstruct", "pair"]), (true, [true, true]));
+        assert_eq!(switches(&["reconstruct", "--strict=false", "pair"]), (true, [false, true]));
+        assert_eq!(
+            switches(&["-vv", "reconstruct", "--strict", "pair", "--refine-calibration=false"]),
+            (false, [true, false])
+        );
+        assert_eq!(
+            switches(&["reconstruct", "--quiet=false", "--strict=true", "pair"]),
+            (false, [true, true])
+        );
+    }
+
+    #[test]
     fn an_unknown_key_is_refused_with_the_nearest_name() {
         let error = expanded("[reconstruct]\nmethd = \"paper\"\n", &["demo"]).unwrap_err();
         assert!(error.contains("reconstruct.methd"), "{error}");
@@ -363,7 +395,7 @@ mod tests {
 
     #[test]
     fn the_schema_knows_every_command_and_its_options() {
-        let schema = schema(&Cli::command());
+        let schema = schema(&command_line());
         let reconstruct = &schema["properties"]["reconstruct"]["properties"];
         assert_eq!(reconstruct["strict"]["type"], "boolean");
         assert_eq!(reconstruct["also"]["type"], "array");
@@ -373,7 +405,7 @@ mod tests {
     #[test]
     fn the_effective_config_gives_the_same_run() {
         let words = ["accurate", "--threads", "2", "table", "--cases", "3", "--seeds", "1,2"];
-        let command = Cli::command().args_override_self(true);
+        let command = command_line();
         let matches = command.clone().try_get_matches_from(words).unwrap();
         let config = effective(&command, &matches);
         let again = expanded(&config, &["table"]).unwrap();
@@ -384,7 +416,7 @@ mod tests {
 
     /// What a saved config and the words that no file holds are parsed to, as a config again.
     fn again(words: &[&str], positional: &[&str]) -> (String, String) {
-        let command = Cli::command().args_override_self(true);
+        let command = command_line();
         let parse = |words: Vec<OsString>| {
             let matches = command.clone().try_get_matches_from(words).unwrap();
             effective(&command, &matches)
@@ -443,7 +475,7 @@ mod tests {
         let words = expanded(config, &["synth", "xray"]).unwrap();
         assert!(words.ends_with(&["xray".to_owned(), "--sheet=s.png".to_owned()]), "{words:?}");
         assert!(!words.contains(&"--count=3".to_owned()), "{words:?}");
-        let schema = schema(&Cli::command());
+        let schema = schema(&command_line());
         let both = &schema["properties"]["synth"]["properties"]["xray"]["anyOf"];
         assert_eq!((&both[0]["type"], &both[1]["type"]), (&"boolean".into(), &"object".into()));
     }

@@ -21,10 +21,10 @@ mod units;
 
 use std::process::ExitCode;
 
+use clap::FromArgMatches;
 use clap::error::ErrorKind;
-use clap::{CommandFactory, FromArgMatches};
 
-use crate::args::Cli;
+use crate::args::{Cli, command_line};
 use crate::console::{coloured, to_stderr};
 use crate::failure::Failure;
 
@@ -51,7 +51,7 @@ fn run(words: Vec<std::ffi::OsString>, json: bool) -> Result<(), Failure> {
         return dicom_child::child(&words);
     }
     // What a config file says stands before what the user says, and the last word wins.
-    let command = Cli::command().args_override_self(true);
+    let command = command_line();
     let config_file = config::config_path(&words);
     let words = config::expand(&command, words)?;
     let parsed = command

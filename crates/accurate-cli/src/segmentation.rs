@@ -75,6 +75,10 @@ fn engine(
 ) -> Result<Box<dyn Engine>, Failure> {
     // As many as the rest of the program has (--threads).
     let threads = rayon::current_num_threads();
+    if args.engine == EngineChoice::Rten && args.onnxruntime.is_some() {
+        return Err(Failure::new(Failure::USAGE, "the engine `rten` takes no --onnxruntime")
+            .with_hint("take --engine ort, or leave one of the two out"));
+    }
     let named = library(args.onnxruntime.as_ref());
     let chosen = match args.engine {
         EngineChoice::Auto if named.is_some() => EngineChoice::Ort,

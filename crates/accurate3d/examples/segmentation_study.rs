@@ -3,8 +3,9 @@
 //! `cargo run --release -p accurate3d --features rten --example segmentation_study -- WHAT MODEL SEED COUNT [GENERATOR | IMAGE...]`
 //!
 //! WHAT is `score` (recall and precision at 2 px, clDice, mean distance of the skeletons' pixels both
-//! ways, with the model's own post-processing: means and the median distance, with 95 % intervals) or
-//! `tune` (the same over a grid of thresholds, smallest pieces and spurs; the best are printed last;
+//! ways, with the model's own post-processing: means and the median distance, with 95 % intervals),
+//! `oracle` (the same without the pieces of which the truth says that they are false: no rule that
+//! drops pieces can reach more) or `tune` (the same over a grid of thresholds, smallest pieces and spurs; the best are printed last;
 //! seed 1500 is for this). GENERATOR is `training` (the default), `held-out`, `phantom`, or a family of
 //! cases (`medium`, `carm`, ...), of whose pictures both views are taken. With images, wires are drawn
 //! onto their middle squares instead of onto generated anatomy, and COUNT images are made of them in
@@ -23,7 +24,7 @@ use accurate3d::io::{read_file, read_grey};
 use accurate3d::seg::network::{
     MAX_MODEL_BYTES, ModelBundle, NetworkOptions, NetworkSegmenter, RtenEngine,
 };
-use accurate3d::seg::{Mask, PostProcessing, Segmenter, unwatched, zhang_suen};
+use accurate3d::seg::{Components, Mask, PostProcessing, Segmenter, unwatched, zhang_suen};
 use accurate3d::synth::{
     CaseOptions, Family, XrayDomain, XrayOptions, draw_xray, draw_xray_held_out, draw_xray_onto,
     draw_xray_phantom, generate, render_xray,
@@ -39,7 +40,7 @@ const TOLERANCE_PX: f64 = 2.0;
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [what, model, seed, count, images @ ..] = args.as_slice() else {
-        return Err("give score or tune, a model, a seed and a number of images".into());
+        return Err("give score, oracle or tune, a model, a seed and a number of images".into());
     };
     let (seed, count): (u64, u64) = (seed.parse()?, count.parse()?);
     let bundle = ModelBundle::read(read_file(Path::new(model), MAX_MODEL_BYTES)?.into())?;
@@ -57,9 +58,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     println!("{} of {count} images show a wire; {}", seen.len(), segmenter.describe());
     match what.as_str() {
-        "score" => Scores::of(&seen, own)?.print()?,
+        "score" => Scores::of(&seen, own, Pieces::AsFound)?.print()?,
+        "oracle" => Scores::of(&seen, own, Pieces::True)?.print()?,
         "tune" => tune(&seen)?,
-        _ => return Err(format!("`{what}` is neither score nor tune").into()),
+        _ => return Err(format!("`{what}` is neither score nor oracle nor tune").into()),
     }
     Ok(())
 }
@@ -128,6 +130,14 @@ fn square_of(path: &Path) -> Result<Array2<u8>, Box<dyn Error>> {
     }))
 }
 
+/// Which pieces of a mask are scored.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Pieces {
+    AsFound,
+    /// Those of whose skeleton at least half lies within [`TOLERANCE_PX`] of the true one.
+    True,
+}
+
 /// Recall, precision, clDice and mean distance of the centrelines, px, of each image; none of one in which
 /// nothing was found: it counts as 0 in recall and clDice, and not in precision and distance.
 struct Scores(Vec<Option<[f64; 4]>>);
@@ -141,17 +151,21 @@ impl Scores {
     fn of(
         seen: &[(Array2<f32>, Array2<bool>)],
         post: PostProcessing,
+        pieces: Pieces,
     ) -> Result<Self, Box<dyn Error>> {
         let each = seen
             .par_iter()
             .map(|(map, truth)| {
-                let found = post.mask_of(map).map_err(|e| e.to_string())?;
+                let true_mask = Mask::from_array(truth.clone()).map_err(|e| e.to_string())?;
+                let true_thin = zhang_suen(&true_mask);
+                let mut found = post.mask_of(map).map_err(|e| e.to_string())?;
+                if pieces == Pieces::True {
+                    found = true_pieces(&found, &true_thin)?;
+                }
                 if found.is_empty() {
                     return Ok(None);
                 }
                 let thin = zhang_suen(&found);
-                let true_mask = Mask::from_array(truth.clone()).map_err(|e| e.to_string())?;
-                let true_thin = zhang_suen(&true_mask);
                 let (a, b) = (thin.as_array().view(), true_thin.as_array().view());
                 let agreement =
                     skeleton_agreement(a, b, TOLERANCE_PX).map_err(|e| e.to_string())?;
@@ -225,6 +239,22 @@ impl std::fmt::Display for Scores {
     }
 }
 
+/// [`Pieces::True`].
+fn true_pieces(found: &Mask, true_thin: &Mask) -> Result<Mask, String> {
+    let components = Components::of(found).map_err(|e| e.to_string())?;
+    let mut kept = Array2::from_elem(found.shape(), false);
+    for number in (1..).take(components.sizes().len()) {
+        let piece = components.labels().mapv(|label| label == number);
+        let thin = zhang_suen(&Mask::from_array(piece.clone()).map_err(|e| e.to_string())?);
+        let (a, b) = (thin.as_array().view(), true_thin.as_array().view());
+        let agreement = skeleton_agreement(a, b, TOLERANCE_PX).map_err(|e| e.to_string())?;
+        if agreement.precision >= 0.5 {
+            kept.zip_mut_with(&piece, |kept, piece| *kept |= piece);
+        }
+    }
+    Mask::from_array(kept).map_err(|e| e.to_string())
+}
+
 /// Each pixel of a skeleton as a point of its own.
 fn pixels(thin: &Mask) -> Vec<Vec<Point2>> {
     let set = thin.as_array().indexed_iter().filter(|(_, set)| **set);
@@ -244,7 +274,7 @@ fn tune(seen: &[(Array2<f32>, Array2<bool>)]) -> Result<(), Box<dyn Error>> {
                         max_spur_px,
                         ..PostProcessing::DEFAULT
                     };
-                    all.push((Scores::of(seen, post)?, post));
+                    all.push((Scores::of(seen, post, Pieces::AsFound)?, post));
                 }
             }
         }

@@ -1,6 +1,7 @@
 //! The command line: one file for the options of related commands.
 
 mod camera;
+mod command_line;
 mod figure;
 mod grey;
 mod reconstruct;
@@ -15,6 +16,7 @@ use clap::{ArgAction, Args, Parser, Subcommand};
 pub use self::camera::{
     CameraArgs, CameraCommand, CameraTarget, ConvertArgs, DoctorArgs, PlanArgs, ViewArgs,
 };
+pub use self::command_line::{command_line, is_switch};
 pub use self::figure::{DemoArgs, FigureArgs};
 pub use self::grey::GreyArgs;
 pub use self::reconstruct::{Extra, ReconstructArgs, TraceArgs, TraceMethod};

@@ -46,27 +46,46 @@ fn info(bundle: &ModelBundle, console: &Console) -> Result<(), Failure> {
         return console.json(&described(bundle));
     }
     let manifest = bundle.manifest();
-    console.data(&format!("name           {}", manifest.name))?;
-    console.data(&format!("BLAKE3         {}", bundle.hash()))?;
-    console.data(&format!(
-        "network        {} weights, {} operations, {} bytes, operator set {}",
-        facts.parameters,
-        facts.nodes,
-        bundle.network().len(),
-        facts.opset
-    ))?;
-    console.data(&format!("normalisation  {:?}", manifest.normalisation))?;
     let [height, width] = manifest.tiling.window_px;
-    console.data(&format!(
-        "images         whole up to {} px, else in windows of {width} x {height} px",
-        manifest.tiling.whole_up_to_px
-    ))?;
-    console.data(&format!("mirror axes    {:?}", manifest.mirror_axes))?;
-    console.data(&format!("mask           {}", manifest.postprocessing))?;
-    for (key, value) in &manifest.card {
-        console.data(&format!("{key:<14} {value}"))?;
-    }
-    Ok(())
+    let axes: Vec<&str> = manifest
+        .mirror_axes
+        .iter()
+        .map(|axis| if *axis == 0 { "down" } else { "across" })
+        .collect();
+    let mut rows = vec![
+        ("name", manifest.name.clone()),
+        ("BLAKE3", bundle.hash().to_owned()),
+        (
+            "network",
+            format!(
+                "{} weights, {} operations, {} bytes, operator set {}",
+                facts.parameters,
+                facts.nodes,
+                bundle.network().len(),
+                facts.opset
+            ),
+        ),
+        ("normalisation", manifest.normalisation.to_string()),
+        (
+            "images",
+            match manifest.tiling.whole_up_to_px {
+                0 => format!("in windows of {width} x {height} px"),
+                most => format!("whole up to {most} px, else in windows of {width} x {height} px"),
+            },
+        ),
+        ("mirrored", if axes.is_empty() { "never".to_owned() } else { axes.join(", ") }),
+        ("mask", manifest.postprocessing.to_string()),
+    ];
+    rows.extend(manifest.card.iter().map(|(key, value)| {
+        let words = match value {
+            Value::String(text) => text.clone(),
+            Value::Null => "not stated".to_owned(),
+            other => other.to_string(),
+        };
+        (key.as_str(), words)
+    }));
+    let column = rows.iter().map(|(key, _)| key.len()).max().unwrap_or(0);
+    rows.iter().try_for_each(|(key, value)| console.data(&format!("{key:<column$}  {value}")))
 }
 
 fn described(bundle: &ModelBundle) -> Value {

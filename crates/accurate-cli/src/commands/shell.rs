@@ -1,10 +1,10 @@
 //! What a shell or a packager asks for: completions, the manual, the schema of the config file.
 
-use clap::{Command, CommandFactory};
+use clap::Command;
 use clap_complete::Shell;
 use clap_mangen::Man;
 
-use crate::args::{Cli, ConfigCommand};
+use crate::args::{ConfigCommand, command_line};
 use crate::config::{schema, subcommands};
 use crate::console::Console;
 use crate::failure::Failure;
@@ -12,14 +12,14 @@ use crate::failure::Failure;
 /// `accurate completions SHELL`: the completion script on stdout.
 pub fn completions(shell: Shell, console: &Console) -> Result<(), Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Cli::command(), "accurate", &mut script);
+    clap_complete::generate(shell, &mut command_line(), "accurate", &mut script);
     console.data(String::from_utf8_lossy(&script).trim_end())
 }
 
 /// `accurate man`: the manual pages of the command and of every command below it, one behind the
 /// other, as roff.
 pub fn manual(console: &Console) -> Result<(), Failure> {
-    let mut command = without_help(Cli::command());
+    let mut command = without_help(command_line());
     command.build();
     let mut pages = Vec::new();
     render(&command, &mut pages).map_err(|error| Failure::new(Failure::IO, error.to_string()))?;
@@ -42,6 +42,6 @@ fn render(command: &Command, pages: &mut Vec<u8>) -> std::io::Result<()> {
 /// `accurate config schema`: the JSON schema of the config file.
 pub fn config(command: &ConfigCommand, console: &Console) -> Result<(), Failure> {
     match command {
-        ConfigCommand::Schema => console.data(&format!("{:#}", schema(&Cli::command()))),
+        ConfigCommand::Schema => console.data(&format!("{:#}", schema(&command_line()))),
     }
 }

@@ -212,6 +212,9 @@ fn a_library_that_is_no_onnx_runtime_is_said_and_not_a_crash() {
     let (code, message) = failure(&mut named);
     assert_eq!(code, 69);
     assert!(message.contains("none.so"), "{message}");
+    let (code, message) = failure(run("rten").arg("--onnxruntime").arg(dir.path().join("none.so")));
+    assert_eq!(code, 2);
+    assert!(message.contains("takes no --onnxruntime"), "{message}");
     let (code, message) = failure(run("ort").env_remove("ORT_DYLIB_PATH"));
     assert_eq!(code, 69);
     assert!(message.contains("--onnxruntime"), "{message}");
@@ -225,6 +228,10 @@ fn models_are_described_verified_and_refused() {
         serde_json::from_str(&stdout(accurate().args(["--json", "model", "info"]).arg(&model)))
             .unwrap();
     assert_eq!((&info["weights"], &info["operations"]), (&Value::from(4), &Value::from(1)));
+    let told = stdout(accurate().args(["model", "info"]).arg(&model));
+    assert!(told.lines().any(|line| line.starts_with("normalisation")), "{told}");
+    // In words: nothing is printed as it stands in a program or in JSON.
+    assert!(!told.contains(['{', '"']), "{told}");
     let verified =
         stdout(accurate().args(["model", "verify"]).arg(&model).env_remove("ORT_DYLIB_PATH"));
     assert!(verified.contains("sound, runs with rten"), "{verified}");

@@ -1,3 +1,5 @@
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -66,6 +68,26 @@ pub enum Normalisation {
     Over255,
     /// As it is.
     None,
+}
+
+/// In words, for people.
+impl fmt::Display for Normalisation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ZScore { least_std } => {
+                write!(
+                    f,
+                    "mean 0, standard deviation 1 over the whole image (divided by at least {least_std})"
+                )
+            }
+            Self::Fixed { low, high, mean, std } => {
+                write!(f, "clipped to {low} .. {high}, less {mean}, divided by {std}")
+            }
+            Self::ZeroToOne => f.write_str("0 at the least value to 1 at the greatest"),
+            Self::Over255 => f.write_str("divided by 255"),
+            Self::None => f.write_str("none"),
+        }
+    }
 }
 
 /// How images are cut into what the network reads at once.
