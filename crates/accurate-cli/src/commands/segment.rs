@@ -175,10 +175,11 @@ fn one(
 fn line(report: &Value) -> String {
     let width = report["median_ridge_width_px"].as_f64().map(|w| format!(", {w:.1} px wide"));
     format!(
-        "{}: {} skeleton pixels in {} pieces{}",
+        "{}: {} skeleton pixels in {} piece{}{}",
         report["image"].as_str().unwrap_or_default(),
         report["skeleton_px"],
         report["pieces"],
+        if report["pieces"] == 1 { "" } else { "s" },
         width.unwrap_or_default()
     )
 }
