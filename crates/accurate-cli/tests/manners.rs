@@ -142,6 +142,9 @@ fn completions_manual_and_schema_cover_every_command() {
             assert!(script.contains(name), "{name} is not completed");
         }
     }
+    // A switch takes a value behind `=` only: none is offered as the next word.
+    let strict: Vec<&str> = scripts[2].lines().filter(|line| line.contains("-l strict")).collect();
+    assert!(!strict.is_empty() && strict.iter().all(|line| !line.contains("true")), "{strict:?}");
 }
 
 /// The manifest of table 1 of one seeded case, written to `out`.

@@ -1,10 +1,10 @@
 //! What a shell or a packager asks for: completions, the manual, the schema of the config file.
 
-use clap::Command;
+use clap::{Command, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::Man;
 
-use crate::args::{ConfigCommand, command_line};
+use crate::args::{Cli, ConfigCommand, command_line};
 use crate::config::{schema, subcommands};
 use crate::console::Console;
 use crate::failure::Failure;
@@ -12,7 +12,8 @@ use crate::failure::Failure;
 /// `accurate completions SHELL`: the completion script on stdout.
 pub fn completions(shell: Shell, console: &Console) -> Result<(), Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(shell, &mut command_line(), "accurate", &mut script);
+    // Switches as switches: of one with a value shells would complete the value as a word of its own.
+    clap_complete::generate(shell, &mut Cli::command(), "accurate", &mut script);
     console.data(String::from_utf8_lossy(&script).trim_end())
 }
 
