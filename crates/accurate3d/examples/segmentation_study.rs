@@ -4,9 +4,9 @@
 //!
 //! WHAT is `score` (recall and precision at 2 px, clDice, mean distance of the skeletons' pixels both
 //! ways, with the model's own post-processing: means and the median distance, with 95 % intervals),
-//! `oracle` (the same without the pieces of which the truth says that they are false: no rule that
-//! drops pieces can reach more) or `tune` (the same over a grid of thresholds, smallest pieces and spurs; the best are printed last;
-//! seed 1500 is for this). GENERATOR is `training` (the default), `held-out`, `phantom`, or a family of
+//! `oracle` (the same without the pieces that are false by the truth, which no rule can know as well)
+//! or `tune` (the same over a grid of thresholds, smallest pieces and spurs; the best are printed
+//! last; seed 1500 is for this). GENERATOR is `training` (the default), `held-out`, `phantom`, or a family of
 //! cases (`medium`, `carm`, ...), of whose pictures both views are taken. With images, wires are drawn
 //! onto their middle squares instead of onto generated anatomy, and COUNT images are made of them in
 //! turn.
